@@ -44,7 +44,10 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 def drop(normal: float, tangential: float, result: Result) -> str:
     """Onset, what is left after the first drop under rising strain, and the end."""
     points = result.path or ()
-    onset, end, (fallen, number) = points[0], points[-1], result.first_drop()
+    onset, end = points[0], points[-1]
+    # At the load of the first break, on the branch of the next point at a load as large.
+    number = next((k for k, p in enumerate(points) if k and p.load_factor >= onset.load_factor), len(points) - 1)
+    fallen = points[number].stress * onset.load_factor / points[number].load_factor
     total = onset.bonded + onset.open + onset.closed
     share = 1.0 - points[number].bonded / total
     strain = min(normal / LARGEST[0], tangential / LARGEST[1])

@@ -40,7 +40,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     to the checkpoint at once.
     """
     check_accuracy(context)
-    count = path_events.resumable(context)
+    count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds = list[tuple[float, float]]()
     with stepped_progress.shown(context.progress, "load") as advance:

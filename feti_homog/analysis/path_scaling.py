@@ -6,27 +6,29 @@ therefore occur at s times the strains and stresses, with s^2 times the energies
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
-
-from feti_homog.analysis.result_records import PathPoint, Peak, Tips
 from feti_homog.results import path_curves
 
-LOADS = ("strain", "to", "waypoints")
-ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy")
-POINT_MEANS = ("strain", "stress", "temperature")
-PEAK_MEANS = ("stress", "strain", "first_break_stress", "first_break_strain", "stress_left")
+LOADS = (
+    "strain",
+    "stress",
+    "temperature",
+    "to",
+    "waypoints",
+    "first_break_strain",
+    "first_break_stress",
+    "stress_left",
+)
+ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
+            "toughness", "G_I", "G_II")  # fmt: skip
+POWERS = dict.fromkeys(LOADS, 1) | dict.fromkeys(ENERGIES, 2)
+"""Powers of s of the numbers in entries of result.json, and in all tables and lists below; others stay."""
 
-Record = TypeVar("Record", PathPoint, Peak, Tips)
 
-
-def scaled(
-    document: Mapping[str, Any], points: Sequence[PathPoint], old_peak: Peak | None, toughness: float
-) -> tuple[dict[str, Any], tuple[PathPoint, ...], Peak | None]:
-    """Return case, points and peak for another toughness of the first interface.
+def scaled(document: Mapping[str, Any], toughness: float) -> dict[str, Any]:
+    """Return case, path and peak of a result for another toughness of the first interface.
 
     With s = sqrt(toughness / toughness in the case) the case gets s times its loads, and every interface s^2 times its
     toughness.  Raises ValueError for a result that does not scale, and for a toughness that is not positive.
@@ -35,30 +37,15 @@ def scaled(
         raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
     if not toughness > 0:
         raise ValueError(f"toughness = {toughness}: expected an energy per area above 0")
-    old, sections = document["case"], path_curves.interface_sections(document)
-    s = math.sqrt(toughness / sections[0]["toughness"])
-    tougher = [{**section, "toughness": section["toughness"] * s**2} for section in sections]
-    path = {name: _times(value, s) if name in LOADS else value for name, value in old["path"].items()}
-    case = {**old, "path": path, "interface": tougher if isinstance(old["interface"], list) else tougher[0]}
-    changed = []
-    for point in points:
-        tips = None if point.tips is None else _scaled(point.tips, ("G_I", "G_II"), s**2)
-        changed.append(replace(_scaled(_scaled(point, POINT_MEANS, s), ENERGIES, s**2), tips=tips))
-    peak = None if old_peak is None else _scaled(_scaled(old_peak, PEAK_MEANS, s), ("dissipated",), s**2)
-    return case, tuple(changed), peak
+    s = math.sqrt(toughness / path_curves.interface_sections(document)[0]["toughness"])
+    case = {**document["case"], **{name: _times(document["case"][name], s) for name in ("path", "interface")}}
+    return {"case": case, **{name: _times(document[name], s) for name in ("path", "peak")}}
 
 
-def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
-    """Multiply the fields `names` of a record by a factor; None stays None."""
-    values = {name: getattr(old, name) for name in names}
-    changes = {name: _times(value, factor) for name, value in values.items() if value is not None}
-    return replace(old, **changes)
-
-
-def _times(value: Any, factor: float) -> Any:
-    """Multiply a number, an array, or the numbers in lists and tables."""
+def _times(value: Any, s: float, power: int = 0) -> Any:
+    """Multiply the numbers in a value by s to the power of their entry."""
     if isinstance(value, Mapping):
-        return {name: _times(item, factor) for name, item in value.items()}
+        return {name: _times(item, s, POWERS.get(name, power)) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_times(item, factor) for item in value]
-    return np.asarray(value) * factor if isinstance(value, np.ndarray) else value * factor
+        return [_times(item, s, power) for item in value]
+    return value * s**power if power else value

@@ -217,22 +217,9 @@ class Result:
         """
         from feti_homog.analysis import path_scaling  # used only for paths by energy
 
-        case, path, peak = path_scaling.scaled(self.document, self.path or (), self.peak, toughness)
-        changed = replace(self, case=case, digest="", path=path, peak=peak)
-        return replace(changed, states=None, result_h5=None, fields=None)
-
-    def first_drop(self) -> tuple[Float, int]:
-        """Return the stress after the first break of a one-leg path.
-
-        The stress, (3,) or (6,), belongs to the load of the break.  Also returns the number of the point whose branch
-        has this stress.  Raises ValueError for any other result.
-        """
-        from feti_homog.results import path_curves
-
         document = self.document
-        if not self.path or not path_curves.is_proportional(document):
-            raise ValueError("only a path of one leg, followed by events, has a first drop")
-        return path_curves.first_drop(document["path"])
+        document |= path_scaling.scaled(document, toughness) | {"digest": ""}
+        return replace(Result.of(document), states=None, result_h5=None)
 
     def __getattr__(self, name: str) -> Any:
         """Return a number of a record of CONSTANTS by its name, such as E1, nu12, G12 or E_axial.

@@ -6,6 +6,7 @@ plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23,
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from feti_homog.materials import voigt
 from feti_homog.system.runtime import described, records
@@ -23,6 +24,8 @@ DEBONDED_ANGLE = (
 )
 
 OWN_SECTION = "number, from 1, of its section [[interface]]; absent where there is one"
+OF_STRAINS: dict[str, Any] = {"components": voigt.STRAINS, "spatial_components": voigt.SPATIAL_STRAINS}
+OF_STRESSES: dict[str, Any] = {"components": voigt.STRESSES, "spatial_components": voigt.SPATIAL_STRESSES}
 DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in their order; absent where there is one"
 
 
@@ -128,13 +131,12 @@ class PathPoint:
     """A path point: break, contact change, end of leg or increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
-    strain: Float = described("macroscopic strain", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS)
+    strain: Float = described("macroscopic strain", "", EITHER, **OF_STRAINS)
     stress: Float = described(
         "macroscopic stress: of events before the bonds that `broke` break, of increments after them",
         records.STRESS,
         EITHER,
-        voigt.STRESSES,
-        spatial_components=voigt.SPATIAL_STRESSES,
+        **OF_STRESSES,
     )
     temperature: float | None = described(TEMPERATURE, default=None)
     mark: str | None = described(
@@ -226,10 +228,8 @@ class Peak:
 class LoadPoint:
     """The equilibrium under one load, with prescribed debonded faces."""
 
-    strain: Float = described("macroscopic strain", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS)
-    stress: Float = described(
-        "macroscopic stress", records.STRESS, EITHER, voigt.STRESSES, spatial_components=voigt.SPATIAL_STRESSES
-    )
+    strain: Float = described("macroscopic strain", "", EITHER, **OF_STRAINS)
+    stress: Float = described("macroscopic stress", records.STRESS, EITHER, **OF_STRESSES)
     temperature: float | None = described(TEMPERATURE, default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", records.STRESS)
@@ -261,17 +261,8 @@ class EnvelopePoint:
         "change of temperature alone breaks a bond",
         default=None,
     )
-    strain: Float | None = described(
-        "macroscopic strain at onset", "", EITHER, voigt.STRAINS, spatial_components=voigt.SPATIAL_STRAINS, default=None
-    )
-    stress: Float | None = described(
-        "macroscopic stress at onset",
-        records.STRESS,
-        EITHER,
-        voigt.STRESSES,
-        spatial_components=voigt.SPATIAL_STRESSES,
-        default=None,
-    )
+    strain: Float | None = described("macroscopic strain at onset", "", EITHER, **OF_STRAINS, default=None)
+    stress: Float | None = described("macroscopic stress at onset", records.STRESS, EITHER, **OF_STRESSES, default=None)
     fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
     interface: int | None = described(OWN_SECTION, default=None)
     bond_angle: float | None = described(

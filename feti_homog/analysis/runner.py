@@ -43,7 +43,6 @@ def run(
         ConvergenceError: after the result has been written and marked.
     """
     comm = progress.comm
-    _say_warnings(case, progress)
     if resume:
         from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
@@ -67,7 +66,6 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         ConvergenceError: a solve did not converge or a check failed.
     """
     progress = progress_bar.Progress(comm, quiet)
-    _say_warnings(case, progress)
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
@@ -78,18 +76,13 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     return result
 
 
-def _say_warnings(case: Case, progress: progress_bar.Progress) -> None:
-    """Print the warnings and remarks about a case."""
-    for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
-        for line in lines:
-            progress.say(f"{label}: {line}")
-
-
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
     """Tear the cell while the PETSc options of the case are set.  Collective."""
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
     process_memory.forget_peak(kept=SPARE_BYTES)
+    for warning in case.warnings():  # all warnings while there is time to stop the run; remarks in the summary
+        progress.say(f"warning: {warning}")
     with options_database.case_options(case.petsc):
         cell = None
         try:
@@ -172,8 +165,8 @@ def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Warn about settings, run the analysis of the case, and return its `Result` entries.  Collective."""
-    for warning in context.warnings():
+    """Warn about the cell, run the analysis of the case, and return its `Result` entries.  Collective."""
+    for warning in (*context.cell.summary.warnings(), *context.warnings()):
         context.progress.say(f"warning: {warning}")
     with context.progress.stage("solve") as line:
         module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
@@ -236,9 +229,13 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
-    """Print the summary on rank 0, without faults, which the error says; other ranks load no tables.  Collective."""
+    """Print the summary on rank 0, without warnings, which are printed before, and faults, which the error says.
+
+    Other ranks load no tables.  Collective.
+    """
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary
 
-        progress.say(f"\n{summary.summary(replace(result, timings=timings, faults=()).document)}")
+        printed = replace(result, timings=timings, warnings=(), faults=())
+        progress.say(f"\n{summary.summary(printed.document)}")

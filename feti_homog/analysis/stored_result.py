@@ -82,6 +82,8 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
     pairs = {path: (before.get(path, "none"), now.get(path, "none")) for path in now | before}
     lines = [f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}"
              for path, (old, new) in pairs.items() if old != new]  # fmt: skip
+    if (old := stored["solver"]["ranks"]) != ranks and len(lines) == 1:
+        raise CaseError(f"--resume: {start} of a run on {old} ranks; go on with as many, or choose another folder")
     where = f", which differs in {', '.join(lines)}" if lines else ""
     raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
 

@@ -1,6 +1,7 @@
 """Debonding tips in result.json: their bond law, driving energies, release rates and modes."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -48,20 +49,15 @@ def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response],
         for response, load in zip(responses, loads, strict=True)
         if load.lstrip("-") in IN_PLANE_LOADS and response.debonded
     ]
+    names = ("fibre", "interface", "angle", "G", "G_I", "G_II", "psi", "length")
     columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in rates]
-    table = map(np.concatenate, zip(*columns, strict=True)) if rates else [np.zeros(0)] * 8
-    fibre, pair, angle, G, G_I, G_II, psi, length = table
-    return TipRates(
-        load=tuple(load for at, load in rates for _ in at.fibre),
-        fibre=tuple(fibre.astype(int).tolist()),
-        angle=angle,
-        G=G,
-        G_I=G_I,
-        G_II=G_II,
-        psi=psi,
-        length=length,
-        interface=_sections(context.cell, pair),
-    )
+    arrays = map(np.concatenate, zip(*columns, strict=True)) if rates else [np.zeros(0)] * len(names)
+    table: dict[str, Any] = dict(zip(names, arrays, strict=True))
+    table |= {
+        "fibre": tuple(table["fibre"].astype(int).tolist()),
+        "load": tuple(x for at, x in rates for _ in at.fibre),
+    }
+    return TipRates(**table | {"interface": _sections(context.cell, table["interface"])})
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Tips:

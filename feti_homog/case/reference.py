@@ -114,7 +114,8 @@ def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
         return [table for table in references if word in ("", table.section)]
     found = []
     for table in references:
-        rows = table.rows if _has(word, table.section) else [r for r in table.rows if _has(word, *vars(r).values())]
+        at = table.section, table.place
+        rows = table.rows if _has(word, *at) else [r for r in table.rows if _has(word, *vars(r).values())]
         if rows or _has(word, table.meaning):
             found.append(replace(table, rows=tuple(sorted(rows, key=lambda row: not _has(word, row.key)))))
     if not found and not results:

@@ -160,9 +160,9 @@ def _cell() -> Iterator[Rule]:
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
     line = "expected true or false: the mesh has its voids"
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
-    others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in UNIT_LOADS))
-    line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, UNIT_LOADS))}"
-    yield Rule((*CELL, "boundary"), lambda value: value == "periodic", line, (OWN_MESH, others))
+    unit_loads, types_of_analysis = kinds.ANALYSIS_TYPE.among(*UNIT_LOADS), _values(kinds.ANALYSIS_TYPE)
+    rule = belonging((*CELL, "boundary"), unit_loads, types_of_analysis, OWN_MESH)
+    yield replace(rule, holds=lambda value: value == "periodic")
     line = 'excludes repair = "snap" and smooth = true, whose sides match'
 
     def matches(cell: Any) -> bool:
@@ -278,9 +278,10 @@ def _loads_and_outputs() -> Iterator[Rule]:
     yield Rule(plane, lambda value: value == scalar, line, (kinds.CONDUCTIVITY,))
     line = 'belongs to type = "conductivity"'
     yield Rule(plane, lambda value: value != scalar, line, (kinds.MECHANICAL,))
-    others = kinds.ANALYSIS_TYPE.among(*(name for name in _values(kinds.ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
-    line = f"belongs to [analysis] type = {' or '.join(map(wording.toml_value, DIFFERENTIABLE))}"
-    yield Rule(("output", "sensitivities"), lambda value: value is not True, line, (others,))
+    rule = belonging(
+        ("output", "sensitivities"), kinds.ANALYSIS_TYPE.among(*DIFFERENTIABLE), _values(kinds.ANALYSIS_TYPE)
+    )
+    yield replace(rule, holds=lambda value: value is not True)
     along = {*voigt.SPATIAL_STRESSES, *voigt.SPATIAL_STRAINS} - {*voigt.STRESSES, *voigt.STRAINS}
     for place in (("output", "stress"), ("envelope", "plane", ITEMS)):
         rule = belonging(place, kinds.GENERALIZED, _values(kinds.PLANE))

@@ -35,7 +35,6 @@ AXIS_MEANING = (
     'are then quoted: "cell.refine" = [0, 1].'
 )
 
-
 RANGE_KEYS = {
     "from": keys.Key(types.real(), "First value, below the last.", required=True),
     "to": keys.Key(types.real(), "Last value.", required=True),
@@ -177,7 +176,11 @@ class Output:
 class Unknown:
     """An unknown SECTION.KEY = {start, lower, upper} of a fit: any key of the file whose value is a number."""
 
-    start: float = key(types.real(), "First value, not outside of the bounds.")
+    start: float = key(
+        types.real(),
+        "First value, not outside of the bounds. If the search from it ends with a misfit or a fault, it begins again "
+        "at the best of 11 points within the bounds, an evaluation each.",
+    )
     lower: float = key(types.real(), "Lower bound.")
     upper: float = key(types.real(), "Upper bound, above the lower one.")
 

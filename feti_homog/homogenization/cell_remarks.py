@@ -174,6 +174,8 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     else:
         sizes = [f"interface_size = {needed:.2g} (or mesh_size, of all elements)"] if needed >= LEAST_SIZE else []
         remedies = ", or ".join([*sizes, *finer]) or "interface_size and refine"
+    if case.cell.accuracy is not None:
+        remedies = f"mesh_size = {case.cell.mesh_size:g} and refine = {case.cell.refine} for accuracy, and {remedies}"
     return [f"{law}: {size}; the process zone is {zone}, {limit}: set {remedies}", *lines]
 
 

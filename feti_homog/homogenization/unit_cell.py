@@ -249,8 +249,6 @@ def assemble_subdomains(
         summary = part.summary
         shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
-    for remark in summary.remarks:
-        progress.say(f"remark: {remark}")
 
     def assembled() -> list[Subdomain]:
         problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()

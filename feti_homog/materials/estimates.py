@@ -15,6 +15,8 @@ from feti_homog.materials import engineering_constants, phase_bounds
 from feti_homog.materials.engineering_constants import TransverseIsotropy
 from feti_homog.materials.phase_bounds import NOTHING, Estimate, Estimates, Fibres
 
+MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
+
 
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
     """Estimate the constants of fibres in a matrix by each method.
@@ -42,17 +44,10 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
     if any(family.springs is not None for family in fibres):
         return NOTHING
     phases, along = _phases(matrix, fibres), _in_parallel(matrix, fibres)
-    E, nu, *_ = along.values()
-    E_transverse = 1 / sum(c / x.E_transverse for c, x in phases)
-    G = 1 / sum(c / x.G_transverse for c, x in phases)
-    return Estimate(
-        **along,
-        E_transverse=E_transverse,
-        nu_transverse=E_transverse / (2 * G) - 1,
-        G_axial=1 / sum(c / x.G_axial for c, x in phases),
-        G_transverse=G,
-        K_transverse=1 / (4 / E_transverse - 1 / G - 4 * nu**2 / E),
-    )
+    E, G, G_axial = (1 / sum(c / getattr(x, name) for c, x in phases) for name in MODULI_ACROSS)
+    K = 1 / (4 / E - 1 / G - 4 * along["nu_axial"] ** 2 / along["E_axial"])
+    return Estimate(**along, E_transverse=E, nu_transverse=E / (2 * G) - 1, G_axial=G_axial, G_transverse=G,
+                    K_transverse=K)  # fmt: skip
 
 
 def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
@@ -68,25 +63,14 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     if len(fibres) != 1 or fibres[0].springs is not None:
         return NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
-    root = math.sqrt(c)
-
-    def mean(of_matrix: float, of_fibre: float) -> float:
-        return of_matrix / (1 - root * (1 - of_matrix / of_fibre))
-
-    along = _in_parallel(matrix, fibres)
-    E_transverse = mean(matrix.E_transverse, fibre.E_transverse)
-    G = mean(matrix.G_transverse, fibre.G_transverse)
+    root, along = math.sqrt(c), _in_parallel(matrix, fibres)
+    pairs = ((getattr(matrix, name), getattr(fibre, name)) for name in MODULI_ACROSS)
+    E, G, G_axial = (of_matrix / (1 - root * (1 - of_matrix / of_fibre)) for of_matrix, of_fibre in pairs)
     if (of_fibre := phase_bounds.expansions(fibre)) and (of_matrix := phase_bounds.expansions(matrix)):
         restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * of_matrix[0]
         along["expansion_transverse"] = root * of_fibre[1] + (1 - root) * (of_matrix[1] + restrained)
-    return Estimate(
-        **along,
-        E_transverse=E_transverse,
-        nu_transverse=E_transverse / (2 * G) - 1,
-        G_axial=mean(matrix.G_axial, fibre.G_axial),
-        G_transverse=G,
-        K_transverse=None,
-    )
+    return Estimate(**along, E_transverse=E, nu_transverse=E / (2 * G) - 1, G_axial=G_axial, G_transverse=G,
+                    K_transverse=None)  # fmt: skip
 
 
 def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:

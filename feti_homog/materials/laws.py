@@ -15,9 +15,7 @@ from feti_homog.typing import Float
 
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
-NEEDED: dict[
-    type[material_forms.Orthotropic] | type[material_forms.TransverselyIsotropic], dict[str, tuple[str, ...]]
-] = {
+NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
     material_forms.Orthotropic: {
         voigt.PLANE_STRAIN.name: ("E3", "nu13", "nu23"),
         voigt.GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23"),

@@ -11,6 +11,7 @@ record shorter than its length, which does not count.
 
 import contextlib
 import json
+import math
 import os
 import re
 import struct
@@ -236,7 +237,7 @@ def unpacked(content: bytes) -> Arrays:
         data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 64 * len(content)))
         event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
         for name, kind, shape in json.loads(data[:start]):
-            event[name] = np.frombuffer(data, kind, int(np.prod(shape)), start).reshape(shape).copy()
+            event[name] = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape).copy()
             start += event[name].nbytes
     except (ArithmeticError, RecursionError, SyntaxError, TypeError, ValueError, zlib.error) as error:
         raise CaseError(f"an event of the checkpoint is damaged: {error}") from error

@@ -183,13 +183,3 @@ def rising_strain(document: Document) -> Float | None:
     if np.any(np.diff(strain) < -ZERO * strain[-1]):
         return None
     return np.column_stack([stress, np.maximum.accumulate(strain)])
-
-
-def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """Return the stress (c,) after the first break of a proportional path, at constant load.
-
-    Return also the number of the point on the branch of that stress.
-    """
-    load = points[0]["load_factor"]
-    number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)
-    return np.asarray(points[number]["stress"]) * load / points[number]["load_factor"], number

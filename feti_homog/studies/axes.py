@@ -64,7 +64,8 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     listed, sampled = [axis for axis in axes if axis.values], [axis for axis in axes if not axis.values]
     lists = [(wording.dotted_key(axis.path), [{axis.path: value} for value in axis.values]) for axis in listed]
     if sampled and settings.samples is not None:
-        lists.append((" and ".join(wording.dotted_key(axis.path) for axis in sampled), _samples(sampled, settings)))
+        names_sampled = " and ".join(wording.dotted_key(axis.path) for axis in sampled)
+        lists.append((names_sampled, sampled_points(sampled, settings)))
     elif settings.samples is not None:
         samples = f"[{sections.SWEEP}] samples = {settings.samples}"
         lines.append(f"{samples}: no key is to be sampled; expected a range {{from, to}}")
@@ -89,7 +90,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     return [{path: value for part in point for path, value in part.items()} for point in points], settings
 
 
-def _samples(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
+def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
     """Draw a Latin hypercube, or independent samples, from the box of the axes."""
     count = settings.samples or 1
     if settings.sampling == "latin":

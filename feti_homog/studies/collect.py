@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.report.text import point_tables, tables
+from feti_homog.report.text import constant_tables, point_tables, tables
 from feti_homog.results import atomic, result_json
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
@@ -18,6 +18,7 @@ from feti_homog.studies.predictions import responses
 from feti_homog.studies.sweep_table import PARTS, SweepTable
 
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
+MOST_ROWS = 40  # of the printed table
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 
@@ -54,19 +55,24 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return a table of peaks or constants over several realisations, with scatter and intervals of the means."""
+    """Return tables of peaks or constants: means over realisations with their scatter, or the values of points."""
     names = [name for name in responses(table.finished[0]) if name in table.stated] if table.finished else []
-    names = [name for name in names if not re.match(r"C\d|onset", name)] or names
+    names = [name for name in constant_tables.shown(names) if not re.match(r"C\d|onset", name)] or names
     columns = [tables.Column("output", -22), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
     columns += [tables.Column("std"), tables.Column("95 % +-")]
-    lines = list[str]()
+    lines, values = list[str](), list[list[Any]]()
     for number, point in enumerate(table.points):
         parts = {name: [getattr(table.statistics[name], part)[number] for part in PARTS] for name in names}
         rows = [[tables.with_unit(name, table.stress_unit), int(count), *moments]
                 for name, (count, *moments) in parts.items() if count > 1]  # fmt: skip
         title = table.label(point) or "All realisations"
         lines += ["", *tables.Table(title, columns, rows).lines] if rows else []
-    return lines
+        values += [] if rows or not table.results_of(point) else [[title, *(part[1] for part in parts.values())]]
+    heads = [tables.with_unit(name, table.stress_unit) for name in names]
+    columns = [tables.Column("", -max([22, *(len(row[0]) + 4 for row in values)]))]
+    columns += [tables.Column(head, max(12, len(head) + 2), ".6g") for head in heads]
+    title = "Results" + f", {MOST_ROWS} of {len(values)} points" * (len(values) > MOST_ROWS)
+    return [*lines, "", *tables.Table(title, columns, values[:MOST_ROWS], most_columns=5).lines] if values else lines
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:

@@ -14,6 +14,7 @@ from scipy.stats import chi2, norm
 from feti_homog.typing import Array, Float
 
 CONFIDENCE = 0.95
+LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 # The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-8, 60
@@ -98,6 +99,11 @@ class ParameterEstimates:
         """The probability of residuals as large under a correct model; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
+
+    @property
+    def misfits(self) -> bool:
+        """Whether the residuals are too large for a correct model."""
+        return self.chance is not None and self.chance < LEAST_CHANCE
 
 
 def estimate(

@@ -7,18 +7,20 @@ DIR/fit.json, measured.csv, fit.png
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from feti_homog.case import interface_section, sections, toml_files
+from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
 from feti_homog.results import atomic, result_json
 from feti_homog.studies import estimation, fit_result
-from feti_homog.studies.axes import Assignment, rounded
+from feti_homog.studies.axes import Assignment, Axis, rounded, sampled_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
@@ -26,6 +28,7 @@ from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
+STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
 Point = tuple[float, ...]
 
@@ -145,38 +148,75 @@ class Evaluations:
     Rank 0 runs the search and asks for evaluations; all ranks compute.
 
     Attributes:
-        answers: on rank 0 the results of all tests by unknowns, in the order of the evaluations.
+        answers: on rank 0 the results of all tests by unknowns, without evaluations that failed.
+        folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
     """
 
     fit: Fit
     evaluator: Evaluator
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
+    folders: dict[Point, str] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
         """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
         comm = self.evaluator.comm
         if comm.rank:
             while (question := comm.bcast(None)) is not None:
-                self._run(*question)
+                if isinstance(question, Exception):
+                    raise question
+                with suppress(CaseError, ConvergenceError):  # rank 0 has the same error, and decides
+                    self._run(*question)
             return None
-        unknowns = [*self.fit.unknowns.values()]
-        y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
-        start, *bounds = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
-        estimates = estimation.estimate(self.values, self.jacobian, (y, std), start, (bounds[0], bounds[1]))
+        try:
+            estimates = self._search()
+        except (CaseError, ConvergenceError) as error:
+            comm.bcast(error)
+            raise
         comm.bcast(None)
         return estimates
+
+    def _search(self) -> estimation.ParameterEstimates:
+        """Search from the start; after a misfit or a fault, also from the best of `STARTS` points.  On rank 0."""
+        unknowns, estimates = [*self.fit.unknowns.values()], None
+        y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
+        start, low, high = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
+
+        def search(x: Float) -> estimation.ParameterEstimates:
+            return estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
+
+        def squares(x: Float) -> float:
+            with suppress(CaseError, ConvergenceError):
+                return float(np.square((self.values(x) - y) / std).sum())
+            return np.inf
+
+        with suppress(CaseError):
+            estimates = search(start)
+        if estimates is not None and not estimates.misfits:
+            return estimates
+        if not self.evaluator.quiet:
+            standard_streams.say(
+                "remark: the search from the start fails; from the best of further points within the bounds:"
+            )
+        box = [
+            Axis(path, ends=(u.lower, u.upper), log=u.lower > 0.0)
+            for path, u in zip(self.fit.paths, unknowns, strict=True)
+        ]
+        further = sampled_points(box, sections.SweepSection(samples=STARTS - 1))
+        best = min([start, *(np.array([*point.values()]) for point in further)], key=squares)
+        if estimates is None or squares(best) < estimates.residuals @ estimates.residuals:
+            estimates = search(best)  # without any sound point this has the fault of the start again
+        return replace(estimates, evaluations=len(self.answers))
 
     def values(self, x: Float) -> Float:
         """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
         key = _rounded(x)
+        folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
-            number = len(self.answers) + 1
-            self.answers[key] = self._ask(f"evaluation-{number:04d}", [(t, key) for t in range(len(self.fit.tests))])
+            self.answers[key] = self._ask(folder, [(test, key) for test in range(len(self.fit.tests))])
             if not self.evaluator.quiet:
                 pairs = zip(self.fit.unknowns, key, strict=True)
-                standard_streams.say(
-                    f"evaluation {number}: {', '.join(f'{name} = {value:.6g}' for name, value in pairs)}"
-                )
+                numbers = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
+                standard_streams.say(f"evaluation {len(self.folders)}: {numbers}")
         return np.concatenate([answer.values for answer in self.answers[key]])
 
     def jacobian(self, x: Float) -> Float:
@@ -197,7 +237,7 @@ class Evaluations:
                 step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
                 ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
                 places += [(test, _rounded([*key[:k], end, *key[k + 1 :]])) for end in ends]
-            answers = self._ask(f"differences-{[*self.answers].index(key) + 1:04d}", places)
+            answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
             for n, (test, k) in enumerate(missing):
                 (below, above), ((_, low), (_, high)) = answers[2 * n : 2 * n + 2], places[2 * n : 2 * n + 2]
                 J[self.fit.rows_of(test), k] = (above.values - below.values) / (high[k] - low[k])

@@ -9,7 +9,6 @@ from feti_homog.case import sections
 from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
-LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
@@ -18,7 +17,7 @@ def content(
 ) -> dict[str, Any]:
     """Return the content of fit.json without its name; numbers that are not finite are None."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
-    misfits = estimates.chance is not None and estimates.chance < LEAST_CHANCE
+    misfits = estimates.misfits
     if misfits and estimates.undetermined:
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")

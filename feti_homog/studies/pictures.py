@@ -184,6 +184,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
         symbols = [f"${plot_helpers.SYMBOLS[points[0][name]]}$" for name in ("strain_name", "name")]
         unit = plot_helpers.stress_unit(results[points[0]["test"] - 1]["case"]) if results else ""
         panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())
+        panels[-1].locator_params(axis="x", nbins=6)
         plot_helpers.finish_curves(panels[-1])
     figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured")
     return figure

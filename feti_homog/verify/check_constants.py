@@ -100,10 +100,8 @@ def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
     """Check the bounds and the estimate of the effective conductivity by their formulas."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
-    limits, bounds = (
-        np.array([1 / (share @ (1 / across)), share @ across]),
-        [forms["wiener"], forms["hashin_shtrikman"]],
-    )
+    limits = np.array([1 / (share @ (1 / across)), share @ across])
+    bounds = [forms["wiener"], forms["hashin_shtrikman"]]
     findings.compare("bounds", forms["axial"], share @ axial, axial.max(), "conductivity_estimates.axial")
     resists = any("conductance" in section for section in cell.files.interfaces)
     findings.require("bounds", bounds == [None, None] if resists else None not in bounds, "conductivity_estimates")

@@ -198,7 +198,7 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     [
         (2, {"normal_strength": "normal_strength = 4.1"}, "differs in interface.normal_strength: 4.0 now 4.1; choose"),
         (2, {"refine": "refine = 1"}, "differs in cell.refine: 0 now 1; choose"),
-        (1, {}, "differs in ranks: 2 now 1; choose"),
+        (1, {}, "of a run on 2 ranks; go on with as many, or choose"),
         (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "decomposition.subdomains: "),
     ],
 )

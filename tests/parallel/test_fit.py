@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.fitted_composites import COMPOSITES, fit, model, truth
+from support.fitted_composites import COMPOSITES, case, fit, model, truth
 
 from feti_homog import CaseError, ConvergenceError, run, run_fit, run_sweep
 from feti_homog.studies import case_runs, fit_file
@@ -127,8 +127,8 @@ def test_tests_share_unknowns_and_fractions_are_fitted(comm, shared_path, glass)
     document["test"] = [test | {"measured": anything} for test in tests]
     asked = fit_file.parse(document, Path())
     sweep = asked.at([true[name] for name in asked.unknowns])
-    for test, case in zip(document["test"], sweep.cases, strict=True):
-        found = run(case, comm).sensitivities
+    for test, ply in zip(document["test"], sweep.cases, strict=True):
+        found = run(ply, comm).sensitivities
         values = dict(zip(found.constants, found.constant_values, strict=True))
         test["measured"] = {n: {"value": float(values[n]), "std": float(0.01 * values[n])} for n in anything}
     found = run_fit(document, shared_path / "out", comm, ranks_per_case=1)
@@ -181,3 +181,57 @@ def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, share
     fitted = run_fit(document, shared_path / "out", comm)
     assert fitted["unknowns"]["interface.toughness"]["estimate"] == pytest.approx(2.0, rel=1e-6)
     assert fitted["status"] == "done" and not [*(shared_path / "out").glob("differences-*")]
+
+
+def bad_start(comm, path, document, truth, starts):
+    """Fit values of a case with the true constants from starts far off; return the fit."""
+    document = copy.deepcopy(document)
+    bounds = {key: {"lower": low, "upper": high} for key, (_, low, high) in truth.items()}
+    document["unknown"] = {key: {"start": value} | bounds[key] for key, (value, *_) in truth.items()}
+    asked = on_root(comm, fit_file.parse, document, Path())
+    values = predicted(run(asked.at([value for value, *_ in truth.values()]).cases[0], comm).document, asked.data)
+    for name, value in zip([name for name in document["measured"] if name != "curve"], values, strict=False):
+        document["measured"][name] = {"value": float(value), "std": float(0.01 * abs(value))}
+    if "curve" in document["measured"]:
+        rows = zip((datum.strain for datum in asked.data), map(float, values), strict=True)
+        text = "E11, S11\n" + "".join(f"{strain!r}, {stress!r}\n" for strain, stress in rows)
+        on_root(comm, Path(document["measured"]["curve"]["file"]).write_text, text)
+    document["unknown"] = {key: {"start": value} | bounds[key] for key, value in zip(truth, starts, strict=True)}
+    return run_fit(document, path / "out", comm)
+
+
+@pytest.mark.parametrize("starts", [(294.0, 0.58, 294.0), (7.0, -0.28, 294.0)])
+def test_stiffnesses_of_a_phase_are_fitted_from_the_corners_of_their_bounds(comm, shared_path, starts):
+    document = case("AS4/3501-6")
+    truth = {"E_transverse": (14.0, 1.0, 300.0), "nu_transverse": (0.25, -0.3, 0.6), "G_axial": (28.0, 1.0, 300.0)}
+    for name in truth:
+        del document["material"]["fibre"][name]
+    document["measured"] = {name: {"value": 1.0, "std": 1.0} for name in ("E1", "G23", "G12", "nu12")}
+    named = {f"material.fibre.{name}": numbers for name, numbers in truth.items()}
+    fitted = bad_start(comm, shared_path, document, named, starts)
+    found = fitted["unknowns"]
+    assert fitted["evaluations"] < 20 and [own["estimate"] for own in found.values()] == pytest.approx(
+        [14.0, 0.25, 28.0], rel=1e-5
+    )
+
+
+def test_stiffnesses_of_an_interface_are_fitted_from_a_corner_of_their_bounds(comm, shared_path):
+    document = {name: FIBRE_THAT_DEBONDS[name] for name in ("cell", "material")}
+    document |= {"analysis": {"type": "stiffness", "plane": "generalized"}, "interface": {"contact": False}}
+    document["measured"] = {name: {"value": 1.0, "std": 1.0} for name in ("E1", "G12", "G13")}
+    truth = {"normal_stiffness": (2000.0, 1.0, 1e6), "tangential_stiffness": (500.0, 1.0, 1e6)}
+    named = {f"interface.{name}": numbers for name, numbers in truth.items()}
+    found = bad_start(comm, shared_path, document, named, (9.8e5, 9.8e5))["unknowns"]
+    assert [own["estimate"] for own in found.values()] == pytest.approx([2000.0, 500.0], rel=1e-5)
+
+
+def test_a_strength_is_fitted_from_a_start_at_which_nothing_breaks(comm, shared_path):
+    """The first evaluation has no onset; the best of the further ones leads to the truth."""
+    document = copy.deepcopy(FIBRE_THAT_DEBONDS)
+    document["interface"] = {"tangential_strength": 1000.0}
+    document["path"] = {"strain": [0.01, 0.0, 0.0]}
+    document["measured"] = {name: {"value": 1.0, "std": 1.0} for name in ("onset_S11", "peak_S11")}
+    truth = {"interface.normal_strength": (30.0, 5.0, 1000.0)}
+    found = bad_start(comm, shared_path, document, truth, (900.0,))
+    assert found["unknowns"]["interface.normal_strength"]["estimate"] == pytest.approx(30.0, rel=1e-6)
+    assert found["status"] == "done" and found["evaluations"] < 20

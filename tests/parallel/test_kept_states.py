@@ -173,6 +173,9 @@ def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, k
             run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
         found = on_root(comm, multipliers_of, shared_path / "checkpoint/events")
         parallel_assert(comm, not found[-1] and len(found) == known and any(found) == (room > 0))
+        with pytest.raises(ConvergenceError, match="max_events"):  # fewer than there are
+            run(case(kind, 5, max_events=known - 2), comm, out=shared_path, resume=True)
+        parallel_assert(comm, len(document(shared_path)["path"]) == known - 2)
         result = run(case(kind, 5), comm, out=shared_path, resume=True)
         in_memory = run(case(kind, 5), comm, fields=True)
     assert result.resumed == known and in_memory.states == result.states

@@ -33,7 +33,7 @@ NEGLIGIBLE = 1e-3
 is far above what irregular meshes make of symmetric cells (1e-6), and below what is known of constants (1e-2)."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class EffectiveMaterial:
     """A linear elastic material in card axes: 1 along the fibre, 2 and 3 along x1 and x2 of the cell.
 
@@ -108,8 +108,7 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
     errors = constant_tables.in_material_axes(constant_tables.mesh_errors(document))
-    values: dict[str, Any] = {"compliance": (compliance + compliance.T) / 2.0, "expansion": expansion, "errors": errors}
-    return EffectiveMaterial(**_origin(document), symmetry=symmetry, **values)
+    return _material(document, symmetry, (compliance + compliance.T) / 2.0, expansion, errors)
 
 
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
@@ -136,15 +135,18 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     computed_errors = (document.get("mesh_error") or {}).get("constants", {})
     cards = engineering_constants.ABOUT_FIBRES.items()
     pairs = [(computed_errors[key], about.card) for key, about in cards if key in computed_errors]
-    values: dict[str, Any] = {"compliance": compliance, "expansion": expansion}
-    values["errors"] = {name: float(error) for error, names in pairs for name in names}
-    return EffectiveMaterial(**_origin(document), symmetry=symmetry, **values)
+    errors = {name: float(error) for error, names in pairs for name in names}
+    return _material(document, symmetry, compliance, expansion, errors)
 
 
-def _origin(document: Document) -> dict[str, Any]:
-    """Return the attributes of a material that result.json contains unchanged."""
-    case = document["case"]
-    return {"name": case["name"], "version": document["version"], "stress_unit": case["output"]["stress_unit"]}
+def _material(
+    document: Document, symmetry: str, compliance: Float, expansion: Float | None, errors: Mapping[str, float]
+) -> EffectiveMaterial:
+    """Return a material with the name, version and unit of a result."""
+    case, version = document["case"], document["version"]
+    return EffectiveMaterial(
+        case["name"], version, case["output"]["stress_unit"], symmetry, compliance, expansion, errors
+    )
 
 
 def require_done(document: Document) -> None:

@@ -16,7 +16,7 @@ of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12
 components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.cards import effective_conductor, effective_material
 from feti_homog.results import output_folder, result_json
-from feti_homog.typing import Document, Float
+from feti_homog.typing import Document
 
 FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
 TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
@@ -50,84 +50,68 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 def abaqus(material: effective_material.EffectiveMaterial) -> str:
     """Return the Abaqus card.  Raises CaseError for an expansion with shears."""
+    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
+    _refuse_shears(material, "which cards for Abaqus do not carry")
+    return _keyword_card(material, "ANISOTROPIC")
+
+
+def calculix(material: effective_material.EffectiveMaterial) -> str:
+    """Return the CalculiX card; an anisotropic material has TYPE=ANISO."""
+    return _keyword_card(material, "ANISO")
+
+
+def _refuse_shears(material: effective_material.EffectiveMaterial, reason: str) -> None:
+    """Raise CaseError for an expansion with shears, for which a format has no place."""
     if material.expansion is not None and material.expansion[3:].any():
-        # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
-        raise CaseError(
-            "its thermal expansion has shears in its axes, which cards for Abaqus do not carry; "
-            "use --transversely-isotropic"
-        )
-    lines = [*effective_material.comments(material, "**"), *elastic(material, "ANISOTROPIC")]
-    if material.expansion is not None:
-        lines += expansion("ORTHO", material.expansion[:3])
+        advice = "use --transversely-isotropic"
+        raise CaseError(f"its thermal expansion has shears in its axes, {reason}; {advice}")
+
+
+def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: str) -> str:
+    """Return the card of the keywords *MATERIAL, *ELASTIC and *EXPANSION.
+
+    An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.
+    """
+    lines = effective_material.comments(material, "**")
+    lines.append(f"*MATERIAL, NAME={effective_material.identifier(material.name)}")
+    if material.is_orthotropic:
+        lines += ["*ELASTIC, TYPE=ENGINEERING CONSTANTS"]
+        lines += ["** E1, E2, E3, nu12, nu13, nu23, G12, G13, and on the next line G23"]
+        lines += _data_lines(material.constants.values())
+    else:
+        C, pairs = material.stiffness, effective_material.PAIRS
+        names = ["D" + "".join(str(axis + 1) for axis in (*pairs[i], *pairs[j])) for i, j in ABAQUS_ENTRIES]
+        lines += [f"*ELASTIC, TYPE={anisotropic}"]
+        lines += [f"** {', '.join(names[k : k + FIELDS])}" for k in range(0, len(names), FIELDS)]
+        lines += _data_lines(C[i, j] for i, j in ABAQUS_ENTRIES)
+    if (alpha := material.expansion) is not None:
+        has_shears = alpha[3:].any()
+        lines += [f"*EXPANSION, TYPE={'ANISO' if has_shears else 'ORTHO'}"]
+        lines += _data_lines((alpha * TENSOR_SHEARS)[ABAQUS_ORDER] if has_shears else alpha[:3])
     return "\n".join(lines)
 
 
-def elastic(material: effective_material.EffectiveMaterial, anisotropic: str) -> Iterator[str]:
-    """Yield the card lines of *MATERIAL and *ELASTIC.
-
-    An anisotropic material has TYPE=`anisotropic` and 21 entries.
-    """
-    yield f"*MATERIAL, NAME={effective_material.identifier(material.name)}"
-    if material.is_orthotropic:
-        yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
-        yield "** E1, E2, E3, nu12, nu13, nu23, G12, G13, and on the next line G23"
-        yield from data_lines(material.constants.values())
-    else:
-        C = material.stiffness
-        names = [
-            "D" + "".join(str(axis + 1) for axis in (*effective_material.PAIRS[i], *effective_material.PAIRS[j]))
-            for i, j in ABAQUS_ENTRIES
-        ]
-        yield f"*ELASTIC, TYPE={anisotropic}"
-        yield from (f"** {', '.join(names[k : k + FIELDS])}" for k in range(0, len(names), FIELDS))
-        yield from data_lines(C[i, j] for i, j in ABAQUS_ENTRIES)
-
-
-def expansion(kind: str, values: Float) -> list[str]:
-    """Return the card lines of *EXPANSION with TYPE=`kind` for the expansions `values`."""
-    return [f"*EXPANSION, TYPE={kind}", *data_lines(values)]
-
-
-def data_lines(values: Iterable[float]) -> list[str]:
+def _data_lines(values: Iterable[float]) -> list[str]:
     """Write the values as card lines of eight numbers, separated by commas."""
     fields = [effective_material.number(value, FIELD) for value in values]
     return [", ".join(fields[k : k + FIELDS]) for k in range(0, len(fields), FIELDS)]
 
 
-def calculix(material: effective_material.EffectiveMaterial) -> str:
-    """Return the CalculiX card; an anisotropic material has TYPE=ANISO."""
-    lines = [*effective_material.comments(material, "**"), *elastic(material, "ANISO")]
-    if material.expansion is not None and material.is_orthotropic:
-        lines += expansion("ORTHO", material.expansion[:3])
-    elif material.expansion is not None:
-        lines += expansion("ANISO", (material.expansion * TENSOR_SHEARS)[ABAQUS_ORDER])
-    return "\n".join(lines)
-
-
 def ansys(material: effective_material.EffectiveMaterial) -> str:
     """Return the ANSYS card.  Raises CaseError for an expansion with shears."""
-    alpha = material.expansion
-    if alpha is not None and alpha[3:].any():
-        raise CaseError(
-            "its thermal expansion has shears in its axes, for which ANSYS has no constants; "
-            "use --transversely-isotropic"
-        )
-    lines = [
-        *effective_material.comments(material, "!"),
-        "! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.",
-    ]
+    _refuse_shears(material, "for which ANSYS has no constants")
+    lines = effective_material.comments(material, "!")
+    lines.append("! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
     if material.is_orthotropic:
-        lines += [
-            f"MP,{label},1,{effective_material.number(material.constants[name])}"
-            for label, name in ANSYS_LABELS.items()
-        ]
+        constants = {label: effective_material.number(material.constants[name]) for label, name in ANSYS_LABELS.items()}
+        lines += [f"MP,{label},1,{constant}" for label, constant in constants.items()]
     else:
         C = material.stiffness
         values = [effective_material.number(C[i, j]) for i, j in ANSYS_ENTRIES]
         lines += ["! Stiffness in the order x, y, z, xy, yz, xz: D11, D21, D31, D41, D51, D61, D22, ..., D66"]
         lines += ["TB,ANEL,1,1,21,0"]
         lines += [f"TBDATA,{k + 1},{','.join(values[k : k + 6])}" for k in range(0, len(values), 6)]
-    if alpha is not None:
+    if (alpha := material.expansion) is not None:
         lines += [f"MP,ALP{axis},1,{effective_material.number(alpha[i])}" for i, axis in enumerate("XYZ")]
     return "\n".join(lines)
 

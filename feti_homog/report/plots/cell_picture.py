@@ -76,7 +76,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
     colours = 0.4 + 0.6 * _cyclic_colours(coloured.max() + 1)
     picture, axes = _outlined(cell, colours[coloured], look)
     cuts = decimation.outline_edges(drawn, drawn.subdomain)
-    plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 1.1)
+    plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 0.8)  # hidden below the outlines
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.9)
     text = f"bodies: {drawn.body.max() + 1}, parts: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
     axes.set_title(_title(cell.file.attrs, text))
@@ -114,7 +114,7 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
     extend = "both" if highest > top else "min"
     bar = drawn_cell.bar_beside(axes, colours, extend)
     letters = int((picture.get_figheight() - 1.2) / 0.075)
-    bar.set_label(fill("local error / mean strain energy (both per area)", letters))
+    bar.set_label(fill("local error / mean energy (both per area)", letters))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh (dark: large)"))

@@ -134,9 +134,8 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
 
 def figure_of(attributes: Any, look: Look = PLAIN) -> tuple[Figure, Axes]:
     """Return a figure with axes for the cell, and room for text and a colour bar."""
-    width, height = (
-        SIDE * np.array([attributes["width"], attributes["height"]]) / max(attributes["width"], attributes["height"])
-    )
+    sides = np.array([attributes["width"], attributes["height"]])
+    width, height = SIDE * sides / sides.max()
     figure = look.figure(width + MARGINS[0], max(height, width / 4) + MARGINS[1], "compressed")
     return figure, figure.subplots()
 

@@ -94,16 +94,14 @@ def of_fields(
         if report.is_followed and look == plot_helpers.PLAIN:
             paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
     for number, state in {} if report.is_curve else states.items():
-        if report.name == "conductivity":
-            if not state.attrs["strain"][2]:  # along the fibres the gradient is uniform
-                name = f"case_{state.attrs['label']}".replace("/", "_")
-                paths.append(save(cell_picture.deformed(cell, state, document), name))
+        strain, conducts = state.attrs["strain"], report.name == "conductivity"
+        if conducts and strain[2]:  # along the fibres the gradient is uniform
             continue
-        strain = state.attrs["strain"]
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
         loads["temperature"] = state.attrs.get("temperature", 0.0)
         (load, value), *further_loads = [load for load in loads.items() if load[1]] or [("", 0.0)]
         is_unit = abs(value) == 1.0 and not further_loads
+        load = state.attrs["label"].replace("/", "_") if conducts else load
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
         paths.append(save(cell_picture.deformed(cell, state, document, look), report.picture or name))
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())

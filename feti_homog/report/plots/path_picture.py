@@ -54,6 +54,7 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
         axes.plot(strain, [point["temperature"] for point in points], color="0.3", linewidth=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
     _count_curves(lower, document, strain, style)
+    lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]

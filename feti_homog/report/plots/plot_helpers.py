@@ -109,10 +109,10 @@ def missing_letters_as_boxes() -> Iterator[None]:
 
 
 def finish_curves(*panels: Axes) -> None:
-    """Add faint grids behind the curves of a figure, and a legend of all panels below."""
+    """Add faint grids behind the curves of a figure, and a legend of the first panel below."""
     for axes in panels:
         faint_grid(axes)
-    legend_below(panels[0].figure, [line for axes in panels for line in axes.get_legend_handles_labels()[0]])
+    legend_below(panels[0].figure, panels[0].get_legend_handles_labels()[0])
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:

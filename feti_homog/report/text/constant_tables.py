@@ -55,19 +55,12 @@ def sensitivities(document: Document) -> list[Table]:
         return []
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4
     at = [constants.index(name) for name in shown(constants)]
-    slopes, shares = list[list[Any]](), list[list[Any]]()
-    for j, (name, value) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
+    values, slopes, shares = [section["constant_values"][k] for k in at], list[list[Any]](), list[list[Any]]()
+    for j, (name, number) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
         row = [section["derivatives"][k][j] for k in at]
+        pairs = zip(row, values, strict=True)
         slopes.append([name, *row])
-        shares.append(
-            [
-                name,
-                *(
-                    without_noise(slope * value / size) if (size := section["constant_values"][k]) else UNKNOWN
-                    for slope, k in zip(row, at, strict=True)
-                ),
-            ]
-        )
+        shares.append([name, *(without_noise(slope * number / c) if c else UNKNOWN for slope, c in pairs)])
     text = "Elasticities, the relative change of a constant by that of a parameter"
     text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
     heads = [(constants[k], max(12, len(constants[k]) + 2)) for k in at]

@@ -42,12 +42,13 @@ def stiffnesses(document: Document) -> list[Table]:
 def conductivity(document: Document) -> list[Table]:
     """Return tables of k^ef and its mesh errors, with closed forms and bounds for the directions across."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
-    columns = [Column("", -6), *(Column(name, 16, ".8g") for name in names)]
-    title = f"Effective conductivity, {engineering_constants.CELL_AXES}"
-    tables = [Table(title, columns, [[name, *row] for name, row in zip(names, np.array(k).tolist(), strict=True)])]
-    if (errors := _errors(document).get("effective_conductivity")) is not None:
-        columns = [Column("", -6), *(Column(name, 16, ".1e") for name in names)]
-        tables.append(Table(MESH_ERROR, columns, [[name, *row] for name, row in zip(names, errors, strict=True)]))
+    title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
+    matrices = (title, k, ".8g"), (MESH_ERROR, errors.get("effective_conductivity"), ".1e")
+    tables = [
+        Table(title, [Column("", -6), *(Column(name, 16, form) for name in names)],
+              [[name, *row] for name, row in zip(names, np.array(matrix).tolist(), strict=True)])
+        for title, matrix, form in matrices if matrix is not None
+    ]  # fmt: skip
     if (forms := document.get("conductivity_estimates")) is not None:
         rows = [["along: mean", UNKNOWN, k[2][2], UNKNOWN, forms["axial"]]]
         for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
@@ -73,11 +74,8 @@ def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, fl
     """
     rows = []
     for name, value in values.items():
-        form, error_form, error = (
-            ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g",
-            ".1e",
-            errors.get(name),
-        )
+        error, form = errors.get(name), ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
+        error_form = ".1e"
         # Other errors are below the digits printed without them, or their constants have extreme sizes.
         if error is not None and error > 1e-7 * abs(value) and 1e-4 < abs(value) < 1e8:
             form = error_form = f".{max(0, 1 - floor(log10(error)))}f"

@@ -83,13 +83,10 @@ def scatter_text(document: Document) -> str:
     if any(result["mesh_error"] is None for result in results):
         lines.append("+- mesh: for stiffnesses, constants, conductivities alone, with [output] mesh_error = true")
     for k, number in enumerate(inputs):
-        noisy = [
-            result["name"]
-            for result in results
-            if (errors := result["derivative_errors"]) and 2 * errors[k] > abs(result["derivatives"][k])
+        slopes = [
+            (r["name"], r["derivative_errors"][k], r["derivatives"][k]) for r in results if r["derivative_errors"]
         ]
-        if noisy:
-            lines.append(
-                f"Standard error over the cells above half of the slope by {number['name']}: {', '.join(noisy)}"
-            )
+        noisy = ", ".join(name for name, error, slope in slopes if 2 * error > abs(slope))
+        start = f"Standard error over the cells above half of the slope by {number['name']}"
+        lines += [f"{start}: {noisy}"] if noisy else []
     return "\n".join(lines)

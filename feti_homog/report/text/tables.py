@@ -131,14 +131,11 @@ class Table:
     def cells(self) -> list[list[str]]:
         """Return the rows as strings: numbers with the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
-        return [
-            # Noise becomes zero, but even small errors stay unchanged.
-            [
-                number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
-                for value, form in zip(row, forms, strict=False)
-            ]
-            for row in self.rows
-        ]
+
+        def cell(value: Any, form: str) -> str:  # noise becomes zero, but even small errors stay unchanged
+            return number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
+
+        return [[cell(value, form) for value, form in zip(row, forms, strict=False)] for row in self.rows]
 
     @property
     def html(self) -> str:

@@ -25,7 +25,9 @@ def test_a_path_refuses_them(tmp_path):
         "interface": {"normal_strength": 1.0},
     }
     found = faults({"folder": tmp_path, "boundary": "traction"}, **sections)
-    assert '[cell] boundary = "traction": belongs to [analysis] type = "stiffness" or "conductivity"' in found
+    assert (
+        '[cell] boundary = "traction": belongs to [analysis] type = "stiffness" or "conductivity", not "path"' in found
+    )
 
 
 def test_sides_that_need_not_match_are_not_snapped(tmp_path):

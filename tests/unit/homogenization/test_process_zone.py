@@ -1,5 +1,6 @@
 """The length along which bonds break by energy, and the warning of elements that do not resolve it."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,14 @@ def test_long_elements_are_warned_of():
 def test_what_the_warning_asks_for_is_enough(remedy):
     assert warnings(case_of(**remedy)) == []
     assert warnings(case_of(refine=1, interface_size=0.036)) == []
+
+
+def test_the_warning_replaces_an_accuracy():
+    cell = {name: value for name, value in CELL.items() if name != "mesh_size"} | {"accuracy": 0.03}
+    (line,) = warnings(cases.parse(case_of().resolved() | {"cell": cell}, Path()))
+    form = r"set mesh_size = (\S+) and refine = (\S+) for accuracy, and interface_size = (\S+) "
+    size, refine, interface_size = re.search(form, line).groups()
+    assert warnings(case_of(mesh_size=float(size), refine=int(refine), interface_size=float(interface_size))) == []
 
 
 def test_other_bonds_have_no_such_length():

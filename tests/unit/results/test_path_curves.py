@@ -9,7 +9,6 @@ from feti_homog.results.landmarks import chosen, chosen_states, marks, peak_of
 from feti_homog.results.path_curves import (
     changed_components,
     ends_of_legs,
-    first_drop,
     first_leg,
     largest_of_legs,
     leading_component,
@@ -34,9 +33,6 @@ def test_snap_back_becomes_a_drop_to_the_next_branch_that_holds() -> None:
     found = load_controlled(points)[:, [3, 0]]
     expected = [[0, 0], [0.05, 0.5], [0.05, 0.2], [0.08, 0.32], [0.08, 0.16], [0.1, 0.2]]
     np.testing.assert_allclose(found, expected, atol=1e-15)
-    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
-    stress, number = first_drop(points)
-    assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
     np.testing.assert_allclose(load_controlled([point(1.0, 3.0, 0)])[:, [3, 0]], [[0, 0], [0.1, 0.3]])
 
 
@@ -206,5 +202,3 @@ def test_under_a_given_stress_the_strain_jumps_at_a_rising_load() -> None:
     assert found is not None and found.shape == (6, 7)
     expected = [[0, 0], [7, 1], [28, 1], [44.8, 1.6], [56, 1.6], [70, 2]]
     np.testing.assert_allclose(found[:, [6, 4]], expected, atol=1e-12)
-    stress, number = first_drop(path["path"])
-    assert number == 2 and stress.tolist() == pytest.approx([0, 0, 0, 0, 1.0, 0])

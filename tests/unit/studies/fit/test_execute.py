@@ -29,6 +29,7 @@ def closed(function, **unknowns):
     rows = {name: Unknown(start=s, lower=low, upper=high) for name, (s, low, high) in unknowns.items()}
     fit = SimpleNamespace(
         unknowns=rows,
+        paths=[(name,) for name in rows],
         data=DATA,
         tests=[{}],
         function=function,

@@ -181,6 +181,10 @@ def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     assert "bulk" not in table.outputs
     assert pictures.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
     assert_drawn(tmp_path, table, ["moduli.png"])
+    single = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents[:2], [1, 2], [1, 1])
+    for printed in ("\n".join(collect.means(each)) for each in (table, single)):
+        # Names that mean the same in the axes of a cell and of a ply.
+        assert "E_transverse" in printed and "G_axial" in printed and "E3" not in printed and "fraction 0.4" in printed
 
 
 def test_bands_are_the_mean_bounds_in_the_results():

@@ -60,5 +60,6 @@ def test_noise_and_costs_have_no_statistics(tmp_path, scale):
 
 
 def test_a_single_realisation_has_no_scatter():
-    assert collect.means(collected({"cell.order": [1]}, [path_document(2, 0.0)], [1], [1])) == []
+    _, title, heads, *rows = collect.means(collected({"cell.order": [1]}, [path_document(2, 0.0)], [1], [1]))
+    assert title == "Results" and "std" not in heads and "peak_S11" in heads and len(rows) == 1
     assert collect.means(collected({"cell.order": [1]}, [None], [1], [1])) == []

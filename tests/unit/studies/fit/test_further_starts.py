@@ -1,0 +1,94 @@
+"""The further starts of a fit, with a cohesive bar in closed form in place of cells."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.studies import fit_file
+from feti_homog.studies.fit import Answer, Evaluations
+
+STRAINS = np.linspace(0.001, 0.02, 15)
+TRUTH = (30.0, 0.2)  # strength, energy per volume
+
+
+def bar(x: Any) -> Any:
+    """Stress of a bar of stiffness 1e4 that softens in a straight line after its strength, and takes the energy."""
+    strength, energy = x
+    first, last = strength / 1e4, 2 * energy / strength
+    return np.interp(STRAINS, [0.0, first, max(last, first * (1 + 1e-9))], [0.0, strength, 0.0], right=0.0)
+
+
+class OfBars(Evaluations):
+    """Evaluations of the bar; `fails` tells where a case cannot be run."""
+
+    count = 0
+
+    def fails(self, x: Any) -> bool:
+        return False
+
+    def _run(self, name: str, places: Any) -> list[Answer]:
+        self.count += len(places)
+        if any(self.fails(x) for _, x in places):
+            raise ConvergenceError("1 of 1 cases failed")
+        return [
+            Answer({"case": {"analysis": {"type": "path"}, "interface": []}, "path": [{}]}, bar(x)) for _, x in places
+        ]
+
+
+def evaluations(folder: Path, monkeypatch: pytest.MonkeyPatch, start: tuple[float, float]) -> OfBars:
+    rows = "".join(f"{strain}, {stress}\n" for strain, stress in zip(STRAINS, bar(TRUTH), strict=True))
+    (folder / "curve.csv").write_text(f"E11, S11\n{rows}")
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4},
+        "material": {phase: {"young": 1.0, "poisson": 0.3} for phase in ("matrix", "fibre")},
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": {},
+        "path": {"strain": [0.03, 0.0, 0.0]},
+        "unknown": {
+            "interface.normal_strength": {"start": start[0], "lower": 5.0, "upper": 150.0},
+            "interface.tangential_strength": {"start": start[1], "lower": 0.05, "upper": 2.0},
+        },
+        "measured": {"curve": {"file": str(folder / "curve.csv"), "std": 0.3}},
+    }
+    monkeypatch.setattr("feti_homog.studies.fit.exact_derivatives", lambda *_: None)
+    evaluator = SimpleNamespace(comm=MPI.COMM_SELF, quiet=True)
+    return OfBars(fit_file.parse(document, folder), evaluator)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("start", [(140.0, 0.06), (7.0, 1.9), (140.0, 1.9), (6.0, 0.06)])
+def test_far_starts_end_at_the_truth(tmp_path, monkeypatch, start):
+    found = evaluations(tmp_path, monkeypatch, start).estimate()
+    assert found is not None and not found.misfits
+    assert found.x == pytest.approx(TRUTH, rel=0.02)
+
+
+def test_a_good_start_needs_no_others(tmp_path, monkeypatch):
+    bars = evaluations(tmp_path, monkeypatch, (28.0, 0.19))
+    found = bars.estimate()
+    assert found is not None and found.x == pytest.approx(TRUTH, rel=1e-3) and len(bars.answers) == found.evaluations
+
+
+def test_cases_that_fail_are_no_starts(tmp_path, monkeypatch):
+    bars = evaluations(tmp_path, monkeypatch, (140.0, 0.06))
+    bars.fails = lambda x: 60.0 < x[0] < 120.0  # type: ignore[method-assign]
+    found = bars.estimate()
+    assert found is not None and found.x == pytest.approx(TRUTH, rel=0.02)
+    assert len(bars.answers) < len(bars.folders)
+    names = [*bars.folders.values()]
+    assert names == [f"evaluation-{k:04d}" for k in range(1, len(names) + 1)]
+
+
+def test_a_fault_without_any_sound_start_is_that_of_the_start(tmp_path, monkeypatch):
+    bars = evaluations(tmp_path, monkeypatch, (140.0, 0.06))
+
+    def refuse(name: str, places: Any) -> list[Answer]:
+        raise CaseError(f"{name} is refused")
+
+    bars._run = refuse  # type: ignore[method-assign]
+    with pytest.raises(CaseError, match="evaluation-0001 is refused"):
+        bars.estimate()
