@@ -15,7 +15,7 @@ from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.08, "order": 2}
 RADIUS = np.sqrt(0.4 / np.pi)
@@ -91,7 +91,7 @@ def test_so_it_is_on_other_meshes_and_of_other_phases(comm, case, error):
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("strain", [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
+@pytest.mark.parametrize("strain", [[-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
 def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain):
     tips, expected = rates(comm, strain, 120.0, SPRINGS, tip_size=2e-4)
     parallel_assert(comm, abs(tips.G.sum() / expected - 1) < 5e-3)
@@ -119,6 +119,7 @@ def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, st
     parallel_assert(comm, np.abs(lost / expected - 1).max() < 0.04 and abs(lost.sum() / expected.sum() - 1) < 8e-3)
 
 
+@pytest.mark.one_rank
 def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):
     strain = np.array([0.5, 0.2, 0.0])
     (point,), _ = solved(comm, strain.tolist(), [100.0], TOUCHING)
@@ -142,6 +143,7 @@ def test_modes_do_not_depend_on_the_mesh(comm):
     parallel_assert(comm, max(angles) - min(angles) < 1.0, str(angles))
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("opening", [0.0, 360.0])
 def test_without_tips_there_is_no_rate(comm, opening):
     (point,), _ = solved(comm, [1.0, 0.0, 0.0], [opening], TOUCHING, order=1)
@@ -168,6 +170,7 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
     parallel_assert(comm, totals[1] == pytest.approx(totals[0], rel=1e-6))
 
 
+@pytest.mark.one_rank
 def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     """A square one, debonded on its right side."""
     write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
@@ -215,6 +218,7 @@ def loaded(comm, cell, arcs, materials=(), folder="."):
     return run(Case.parse(document, Path(folder)), comm).load
 
 
+@pytest.mark.one_rank
 @pytest.mark.quick
 @pytest.mark.parametrize("centre", [0.0, 100.0])
 def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, shared_path, centre):
@@ -252,7 +256,7 @@ INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
 def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, growing, bond):
     """While the arc on the other interface stays as long as it is."""
     radius, coating, strain = 0.25, 0.3, {"E11": 0.3, "E22": -0.5, "gamma12": 0.4}
-    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.08, "order": 2, "refine": 1}
+    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.05, "order": 2}
 
     def solved_with(opening):
         arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]
