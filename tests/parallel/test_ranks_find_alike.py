@@ -119,5 +119,5 @@ def test_a_debonded_conductor_with_resistance(comm):
     assert_alike(comm, "conductance")
 
 
-def test_derivatives_by_springs_under_contact(comm):
-    assert_alike(comm, "derivatives under contact")
+def test_springs_beside_faces_that_touch(comm):
+    assert_alike(comm, "springs")
