@@ -12,7 +12,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog import Case, run
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
 GLASS_EPOXY = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
 PRESSED = [[-0.01, -0.004, 0.0], [-0.01, -0.004, 0.02], [-0.01, -0.004, -0.02]]
@@ -38,7 +38,6 @@ def test_a_laminate_closes_its_parallelogram(comm, shared_path):
     np.testing.assert_allclose([p.friction_heat for p in points], heat, atol=1e-10 * heat.max())
 
 
-@pytest.mark.one_rank
 def test_bonds_of_a_laminate_rub_with_their_damaged_share(comm, shared_path):
     """The first of two teeth, cycles, and where the second breaks them: stress, heat and certificate."""
     write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
@@ -69,7 +68,6 @@ def test_bonds_of_a_laminate_rub_with_their_damaged_share(comm, shared_path):
     assert_certified(comm, shared_path / "out")
 
 
-@pytest.mark.one_rank
 @pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.25, 0.5])
 def test_a_fibre_in_a_medium_slips_first_where_the_formula_has_it(comm, friction):
@@ -84,7 +82,6 @@ def test_a_fibre_in_a_medium_slips_first_where_the_formula_has_it(comm, friction
     assert slipped.stress[0] + 1.0 == pytest.approx(load, rel=5e-3)
 
 
-@pytest.mark.one_rank
 def test_limits_of_the_coefficient(comm):
     """Hardly any friction is none, much under pressure is a bonded cell."""
     case = {"cell": {}, "phases": EPOXY_GLASS, "plane": "strain", "path": {"waypoints": PRESSED}}
@@ -96,7 +93,6 @@ def test_limits_of_the_coefficient(comm):
             assert point.friction_heat < 1e-9
 
 
-@pytest.mark.one_rank
 def test_generalized_plane_strain_has_the_numbers_of_plane_strain_in_the_plane(comm):
     """Shear along the fibres changes none of them, but adds its own stress."""
     case = {"cell": {}, "phases": EPOXY_GLASS, "interface": WHOLE | {"friction": 0.3}}
@@ -155,7 +151,6 @@ PATHS = {
 }
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("name", "release"),
     [
@@ -188,7 +183,6 @@ def test_increments_are_those_of_the_twin(comm, name, release):
     assert found[-1].friction_heat > 0.0
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("name", PATHS)
 def test_paths_are_those_of_the_twin(comm, name):
     """Bonds break in one order at the same loads, with the same energies."""

@@ -9,7 +9,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 RANDOM = {"geometry": "random", "seed": 3, "mesh_size": 0.1}
 STIFF = {"young": 400.0, "poisson": 0.1}
@@ -26,7 +26,6 @@ def case_of(cell, **materials):
     return cases.parse(document, Path())
 
 
-@pytest.mark.one_rank
 @pytest.mark.quick
 def test_two_phases_of_one_material_are_one_phase(comm):
     """With equal radii, where numbers are as the fractions, the centres are those of the cell of one phase."""
@@ -35,7 +34,6 @@ def test_two_phases_of_one_material_are_one_phase(comm):
     assert relative_error(solve(mixed, comm)[1], solve(plain, comm)[1]) < 1e-9
 
 
-@pytest.mark.one_rank
 @pytest.mark.quick
 def test_a_mix_is_the_table_of_its_fibres_in_any_order(comm):
     cell = RANDOM | {"mix": MIX, "radii": RADII, "fibres": 7}
@@ -66,7 +64,6 @@ def test_a_mix_has_the_stiffness_of_its_mesh_solved_at_once(comm):
     assert order.tolist() == [0, 1]
 
 
-@pytest.mark.one_rank
 @pytest.mark.quick
 def test_names_do_not_matter_but_for_the_places_of_fibres(comm):
     """The phases of a mix are placed in the order of their names."""

@@ -22,7 +22,7 @@ from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 FIBRES = [
     {"x": 0.27, "y": 0.25, "radius": 0.18, "phase": "fibre"},
@@ -53,7 +53,6 @@ def two_inclusions(softness, stiff, soft, unit=1.0, young=10.0, **analysis):
     )
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("softness", [1e-10, 1e-13])
 def test_interfaces_far_apart_break_at_the_same_loads(comm, softness):
     """On springs far stiffer than the soft fibre, what breaks release is as small as its stiffness."""
@@ -71,7 +70,6 @@ def test_interfaces_far_apart_break_at_the_same_loads(comm, softness):
     assert min(found[-1].debonded_length) > 2 * 0.18 * np.pi / 3
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("what", ["fibre", "springs"])
 def test_a_soft_inclusion_touches_where_any_does(comm, what):
     """Neither the forces of a stiff fibre nor the body beside soft springs are a scale of its forces."""
@@ -89,7 +87,6 @@ def test_a_soft_inclusion_touches_where_any_does(comm, what):
     assert (found.open, found.closed) == (expected.open, expected.closed) and found.closed > 3 < found.open
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("bond", ["strength", "energy"])
 def test_onsets_of_a_soft_inclusion_do_not_depend_on_its_softness(comm, bond):
     def onsets(softness):
@@ -111,7 +108,6 @@ def test_onsets_of_a_soft_inclusion_do_not_depend_on_its_softness(comm, bond):
 STIFF_ALONG = {"stiffness": np.diag([1e9, 2.0, 3.0, 1.0, 1.0, 1.0]).tolist()}
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("bonded", [True, False])
 def test_a_component_far_softer_than_another_carries_its_stress(comm, bonded):
     """Uniform, so the strains are the stresses over the stiffnesses."""
@@ -133,7 +129,6 @@ def loaded_along(bonded):
     return Case.parse(document)
 
 
-@pytest.mark.one_rank
 def test_a_stress_that_is_missed_beside_a_far_larger_one_is_no_result(comm, monkeypatch):
     superposed = mixed_load.superposed
 
@@ -210,7 +205,6 @@ def softly_held(comm, stiffness, young, count, **cell):
     return np.array([point.load_factor for point, _ in zip(points, range(count), strict=False)]), cell
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(("stiffness", "young"), [(1e-6, 1e6), (1e-9, 1e6), (1e-12, 1.0), (1e-16, 10.0), (1e-16, 1e5)])
 def test_soft_springs_break_as_between_rigid_bodies(comm, stiffness, young):
     found, cell = softly_held(comm, stiffness, young, 6)
@@ -232,7 +226,6 @@ def test_springs_too_soft_beside_a_cut_fibre_are_refused(comm):
         softly_held(comm, 1e-16, 1e6, 2, **pieces)
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("stiffness", [1e-9, 1e-12])
 def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm, stiffness):
     """Its forces are found on the side of the matrix, theirs on that of the fibre."""
@@ -248,7 +241,6 @@ def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm, stiffness):
     assert found == pytest.approx(expected, rel=3e-5) and len(found) > 10
 
 
-@pytest.mark.one_rank
 def test_units_of_stress_change_neither_loads_nor_the_number_of_reference_cells(comm, monkeypatch):
     def path(unit):
         made, factor, follow = [], ExactInverse._factor, ExactInverse._follow

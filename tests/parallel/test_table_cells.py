@@ -9,7 +9,7 @@ from support.cases import FIBRE, MATRIX, relative_error, solve
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 PHASES = {"matrix": MATRIX, "fibre": FIBRE, "fibre:2": {"young": 400.0, "poisson": 0.1}}
 RANDOM = {"geometry": "random", "fibre_fraction": 0.45, "fibres": 8, "seed": 3, "radius_spread": 0.2}
@@ -47,7 +47,6 @@ def test_a_random_cell_from_its_table(comm, shared_path):
     assert relative_error(found, expected) < 1e-9
 
 
-@pytest.mark.one_rank
 @pytest.mark.quick
 def test_origin_units_and_order_do_not_matter(comm):
     """Try fibres of two phases, numbered in the order of the rows."""
@@ -64,7 +63,6 @@ def test_origin_units_and_order_do_not_matter(comm):
     assert cell.summary.radii[1:] == pytest.approx(137.3 * arrangement.radii[order], rel=1e-8)
 
 
-@pytest.mark.one_rank
 def test_equal_phases_under_two_names_are_one(comm, monkeypatch):
     monkeypatch.setitem(PHASES, "fibre:2", FIBRE)
     arrangement = arrange(case_of(RANDOM).cell)
