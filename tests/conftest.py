@@ -56,12 +56,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--from-case", type=int, default=0, metavar="K", help=words)
     words = "of those not the cases that `-m 'not few_ranks' --every N` runs on more ranks"
     parser.addoption("--but-every", type=int, metavar="N", help=words)
+    words = "of tests with several cases not those that `-m 'not one_rank' --every N` runs on several ranks"
+    parser.addoption("--but-shared", type=int, metavar="N", help=words)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what --every and --but-every do, of the tests that marks and names have left."""
-    every, others, first = (config.getoption(name) for name in ("every", "but_every", "from_case"))
+    """Leave out what --every, --but-every and --but-shared do, of the tests that marks and names have left."""
+    every, others, shared, first = map(config.getoption, ("every", "but_every", "but_shared", "from_case"))
     count = Counter(item.nodeid.partition("[")[0] for item in items)
     chosen: list[pytest.Item] = []
     dropped: list[pytest.Item] = []
@@ -69,8 +71,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         test = item.nodeid.partition("[")[0]
         runs_elsewhere = others and cases[test] % others == 0 and item.get_closest_marker("few_ranks") is None
+        is_shared = shared and cases[test] % shared == 0 and count[test] > 1 and not item.get_closest_marker("one_rank")
         is_chosen = cases[test] % every == first % min(every, count[test])
-        (chosen if is_chosen and not runs_elsewhere else dropped).append(item)
+        (chosen if is_chosen and not runs_elsewhere and not is_shared else dropped).append(item)
         cases[test] += 1
     items[:] = chosen
     if dropped:

@@ -6,7 +6,8 @@ import re
 import pytest
 from support.command_line import command_line
 from support.hooks import KILL, WAIT, Hook, HookedJob, hooked
-from support.jobs import ROOT, mpirun
+from support.jobs import ROOT
+from support.standing_jobs import standing_job
 
 COMMIT = "feti_homog.results.atomic:commit"
 FIT = """
@@ -103,8 +104,7 @@ def test_a_study_whose_disk_is_full_goes_on(tmp_path, kind, name, call):
     assert json.loads((out / f"{kind}.json").read_text())["status"] == "done"
 
 
-@pytest.mark.parametrize("other", ["sweep", "fit", "uncertainty"])
-@pytest.mark.parametrize("first", ["sweep", "fit"])
+@pytest.mark.parametrize(("first", "other"), [("sweep", "fit"), ("fit", "fit"), ("fit", "uncertainty")])
 def test_a_second_study_in_the_folder_of_another_ends_in_one_line(tmp_path, first, other):
     """The first one waits before its first result, and ends as if it were alone."""
     for name, text in STUDIES.items():
@@ -129,7 +129,7 @@ TRUTH = {
 
 @pytest.mark.parametrize("driver", TRUTH)
 def test_estimates_are_what_the_data_were_made_of(tmp_path, driver):
-    job = mpirun(0, ROOT / f"drivers/{driver}.py", "--out", tmp_path, "--quick")
+    job = standing_job(1).run(ROOT / f"drivers/{driver}.py", "--out", tmp_path, "--quick")
     assert job.returncode == 0, job.stderr
     rows = re.findall(r"^(\w[\w ]*?) +[\d.]+ +([\d.]+)(?: +\S+)?$", job.stdout, re.MULTILINE)
     found = {name: float(value) for name, value in rows}

@@ -7,12 +7,15 @@ import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import assert_verified
-from support.jobs import ROOT, mpirun
+from support.jobs import ROOT
+from support.standing_jobs import standing_job
 from support.sweep_files import means
 
 
 def driven(name, folder, *options):
-    job = mpirun(2, ROOT / f"drivers/{name}.py", "--out", folder, "--quiet", "--ranks-per-case", "1", *options)
+    job = standing_job(2).run(
+        ROOT / f"drivers/{name}.py", "--out", folder, "--quiet", "--ranks-per-case", "1", *options
+    )
     assert job.returncode == 0, job.stderr
     return job.stdout
 
@@ -51,7 +54,9 @@ def test_representative_cell_prints_what_scatters(tmp_path):
 
 
 def test_effective_stiffness_prints_errors_below_2e_5(tmp_path):
-    job = mpirun(2, ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fields", "--fractions", "0.2", "0.4")
+    job = standing_job(2).run(
+        ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fields", "--fractions", "0.2", "0.4"
+    )
     assert job.returncode == 0, job.stderr
     rows = re.findall(r"^(square|hexagonal) +(strain|stress) (.*)$", job.stdout, re.MULTILINE)
     assert len(rows) == 4
@@ -63,10 +68,10 @@ def test_effective_stiffness_prints_errors_below_2e_5(tmp_path):
     assert imread(tmp_path / "entries.png")[..., :3].std() > 0.05
 
 
-@pytest.mark.parametrize("ranks", [1, 4])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_iterations_prints_a_row_for_every_refinement(tmp_path, ranks):
     words = ["--out", tmp_path, "--refine", "0", "1", "--mesh-size", "0.1", "--fields"]
-    job = mpirun(ranks, ROOT / "drivers/iterations.py", *words)
+    job = standing_job(ranks).run(ROOT / "drivers/iterations.py", *words)
     assert job.returncode == 0, job.stderr
     rows = [line.replace(",", "").split() for line in job.stdout.splitlines()[1:]]
     assert [row[0] for row in rows] == ["0", "1"]
@@ -76,8 +81,8 @@ def test_iterations_prints_a_row_for_every_refinement(tmp_path, ranks):
 
 @pytest.mark.parametrize("driver", ["effective_stiffness", "iterations"])
 def test_help_ends_with_0_and_faults_with_2(tmp_path, driver):
-    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--help")
+    job = standing_job(2).run(ROOT / f"drivers/{driver}.py", "--help")
     assert job.returncode == 0 and job.stdout.count("usage:") == 1
-    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")
+    job = standing_job(2).run(ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")
     assert job.returncode == 2 and job.stderr.count("[cell] mesh_size = 7.0: expected a number") == 1
     assert not (tmp_path / "new").exists()

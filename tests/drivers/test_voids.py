@@ -6,12 +6,13 @@ import numpy as np
 from matplotlib.image import imread
 from support.command_line import assert_verified
 from support.drivers import column, driven
-from support.jobs import ROOT, mpirun
+from support.jobs import ROOT
+from support.standing_jobs import standing_job
 
 
 def test_voids_soften_as_mori_and_tanaka_say(tmp_path):
     """From below, as for stiff fibres, by less than a fifth; all folders are verified."""
-    job = mpirun(2, ROOT / "drivers/voids.py", "--out", tmp_path / "out", "--quick", "--fields")
+    job = standing_job(1).run(ROOT / "drivers/voids.py", "--out", tmp_path / "out", "--quick", "--fields")
     assert job.returncode == 0, job.stderr
     with (tmp_path / "out/voids.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -25,7 +26,7 @@ def test_voids_soften_as_mori_and_tanaka_say(tmp_path):
 
 
 def test_the_driver_meets_composite_cylinders(tmp_path):
-    job = mpirun(2, ROOT / "drivers/coated_fibres.py", "--out", tmp_path / "out", "--quick", "--fields")
+    job = standing_job(1).run(ROOT / "drivers/coated_fibres.py", "--out", tmp_path / "out", "--quick", "--fields")
     assert job.returncode == 0, job.stderr
     with (tmp_path / "out/coated_fibres.csv").open(newline="") as stream:
         ratio, bulk, cylinders, shear, inner, outer = np.array(list(csv.reader(stream))[1:], float).T

@@ -73,7 +73,7 @@ def test_strain_energies_err_by_less_than_asked_for(name, order):
     assert "coating" in phases or error > 1e-3 * ACCURACIES[order]
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize(("geometry", "plane"), BONDED)
 def test_bonded_cells_against_their_series(geometry, plane, accuracy):
     exact = cubic(*BONDED[geometry, plane].value)

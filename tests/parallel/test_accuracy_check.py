@@ -11,7 +11,7 @@ from feti_homog import Case, run
 from feti_homog.analysis.constants import note_accuracy
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 EPOXY, GLASS = {"young": 3.45, "poisson": 0.35}, {"young": 73.0, "poisson": 0.22}
 UNIT = {"analysis": {"type": "stiffness", "plane": "strain"}}

@@ -56,8 +56,11 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     assert relative_error(stress, stress_of_one) < 1e-9
 
 
-@pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
-@pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("contrast", "pieces"),
+    [(1e-3, 24), (1.0, 50), (1e6, 50)],
+    ids=["soft, matrix cut", "equal, all cut", "stiff, all cut"],
+)
 def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     case = NARROW | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
@@ -95,7 +98,7 @@ MULTIGRID = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("contrast", [23.0, 1e6])
+@pytest.mark.parametrize("contrast", [1e6])
 def test_a_coarse_problem_solved_by_multigrid_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []

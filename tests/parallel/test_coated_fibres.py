@@ -67,6 +67,7 @@ def test_a_coating_of_the_material_around_or_within_is_none():
     assert inside == pytest.approx(larger, abs=1e-4 * 10)
 
 
+@pytest.mark.one_rank
 def test_soft_coatings_tend_to_elastic_interfaces():
     """k_n = (lambda + 2 G) / t and k_t = G / t, as t / a falls with the stiffness: an error of the first order in t."""
     share, poisson, errors = 0.3, 0.3, []
@@ -82,6 +83,7 @@ def test_soft_coatings_tend_to_elastic_interfaces():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("young", [3e-3, 3.0, 3e3])
 def test_thin_coatings_take_few_iterations(young):
     cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
@@ -103,6 +105,7 @@ def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
     assert_certified(comm, shared_path / "result")
 
 
+@pytest.mark.one_rank
 def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
     """Balance forces to their own rounding at 1e5 times the stiffness around, free or rubbing."""
     whole, young = {"debonded": [{"fibre": 1, "angle": 360.0}]}, {"matrix": 1.0, "fibre": 9.0, "coating": 1e5}

@@ -18,7 +18,7 @@ from feti_homog.studies.outputs import outputs
 from feti_homog.studies.predictions import responses
 from feti_homog.system.runtime.records import plain
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 # Every constant has a value of its own: no axis of symmetry, couplings of shears.
 DISTINCT = {
     "name": "distinct",

@@ -21,7 +21,7 @@ from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 NORMAL, TANGENTIAL, TOUGHNESS = 700.0, 150.0, 0.02
 FRACTION = 0.25

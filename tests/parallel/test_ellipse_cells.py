@@ -11,7 +11,7 @@ from support.ranks import assert_certified
 from feti_homog import Case, run
 from feti_homog.case import cases
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 ROWS = [
     {"x": 0.45, "y": 0.55, "a": 0.28, "b": 0.14, "angle": 30.0},
@@ -56,6 +56,7 @@ def test_turned_table_has_the_turned_stiffness(comm):
     assert np.abs(first[2, :2]).max() > 1e-3 * np.abs(first).max()
 
 
+@pytest.mark.one_rank
 @pytest.mark.quick
 @pytest.mark.parametrize("order", [1, 2])
 def test_debonded_ellipse_obeys_every_law(comm, shared_path, order):

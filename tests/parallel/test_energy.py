@@ -22,7 +22,7 @@ from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 # Glass and epoxy, MPa and micrometres; sigma_c = 90 MPa, G_Ic = 2 J/m2, fibres of 7.5 micrometres, 40 %.
 GLASS_EPOXY = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
@@ -78,7 +78,6 @@ def test_elements_too_long_for_the_energy_are_warned_of(comm):
     parallel_assert(comm, run(Case.parse(document), comm).warnings == ())
 
 
-@pytest.mark.one_rank
 def test_onset_in_the_square_cell_is_the_published_one(comm):
     coarse, fine = (np.abs(onset(comm, refine=refine, **SQUARE)).max() for refine in (0, 2))
     assert fine < 1e-4 and np.log2(coarse / fine) > 2 * 1.8
@@ -110,7 +109,6 @@ def rising_curve(interface, points):
     return np.array(GLASS_EPOXY_MULTIPLES) / 3.2 * stress
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("growth", ["springs", "released"])
 def test_curves_of_fine_straight_elements_are_the_published_ones(comm, growth):
     _, interface, points = path(comm, growth, [3.2 * ONSET_STRAIN, 0.0, 0.0], refine=4, **LINEAR)

@@ -15,7 +15,7 @@ from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.08, "order": 2}
 RADIUS = np.sqrt(0.4 / np.pi)
@@ -55,7 +55,6 @@ def rates(comm, strain, opening, bond, **case):
     return point.tips, (energies[0] - energies[1]) / (2 * np.radians(STEP) * RADIUS)
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("bond", "strain"),
     [
@@ -73,7 +72,6 @@ def test_the_total_is_what_the_energy_loses(comm, bond, strain):
     parallel_assert(comm, np.abs(tips.G_I + tips.G_II - tips.G).max() < 1e-12)
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("case", "error"),
     [
@@ -90,8 +88,7 @@ def test_so_it_is_on_other_meshes_and_of_other_phases(comm, case, error):
     parallel_assert(comm, abs(tips.G.sum() * radius / RADIUS / expected - 1) < error)
 
 
-@pytest.mark.one_rank
-@pytest.mark.parametrize("strain", [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
+@pytest.mark.parametrize("strain", [[-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
 def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain):
     tips, expected = rates(comm, strain, 120.0, SPRINGS, tip_size=2e-4)
     parallel_assert(comm, abs(tips.G.sum() / expected - 1) < 5e-3)
@@ -99,7 +96,6 @@ def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain)
         parallel_assert(comm, bool((tips.G_I == 0.0).all() and (tips.psi == 90.0).all()))
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(("bond", "strain"), [(FREE, [1.0, 0.0, 0.0]), (TOUCHING, [-1.0, 0.0, 0.0])])
 def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, strain):
     """On one mesh, in analyses whose arcs differ by one or two edges of one size at each tip.
@@ -131,7 +127,6 @@ def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):
     parallel_assert(comm, np.abs(twice.tips.psi - point.tips.psi).max() < 1e-3)
 
 
-@pytest.mark.one_rank
 def test_modes_do_not_depend_on_the_mesh(comm):
     """Modes belong to a length of R / 1000, if the elements are smaller."""
     angles = []
@@ -182,7 +177,6 @@ def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     comm.barrier()
 
 
-@pytest.mark.one_rank
 def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
     """In a cell 40 radii wide, whose strain is that of the matrix under uniaxial stress."""
     young, poisson, widths = 3.5, 0.4, 40
@@ -232,7 +226,6 @@ def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, s
     assert relative_error(found.tips.G, expected.tips.G[np.array(expected.tips.fibre) == 1]) < 1e-7
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize("coating", [0.3, 0.02])
 def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coating):
     """The fibres have the same outer radius, on another mesh; a coated fibre is bonded to its coating."""
@@ -247,12 +240,11 @@ def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coatin
 INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
 
 
-@pytest.mark.one_rank
 @pytest.mark.parametrize(("growing", "bond"), [(OUTER, FREE), (INNER, TOUCHING)], ids=["outer", "inner"])
 def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, growing, bond):
     """While the arc on the other interface stays as long as it is."""
     radius, coating, strain = 0.25, 0.3, {"E11": 0.3, "E22": -0.5, "gamma12": 0.4}
-    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.08, "order": 2, "refine": 1}
+    cell = {"fibre_fraction": np.pi * radius**2, "coating": coating, "mesh_size": 0.05, "order": 2}
 
     def solved_with(opening):
         arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]

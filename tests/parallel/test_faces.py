@@ -26,9 +26,10 @@ TIGHT = 1e-9
 FACEWISE = Thresholds(whole_boundary_dofs=30)
 
 
-@pytest.fixture(params=CASES.values(), ids=CASES.keys())
-def faces(request, comm):
+@pytest.fixture(scope="module", params=CASES.values(), ids=CASES.keys())
+def faces(request):
     """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
+    comm = MPI.COMM_WORLD
     cell = torn_cells.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
     solver, operators, found = cell.solver, cell.solver.interface_operators, []
     neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
@@ -103,6 +104,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
+@pytest.mark.one_rank
 def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm):
     """Compare modes by faces, of a whole body, and rigid-body motions alone; faces give a few more modes."""
     case = WHOLE | {"refine": 1, "min_gap": 0.01, "fibre_fraction": 0.65}

@@ -12,7 +12,7 @@ from feti_homog.studies import case_runs, fit_file
 from feti_homog.studies.predictions import exact_derivatives, predicted
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +24,7 @@ def glass():
     return fit(name, model(name, MPI.COMM_WORLD)([*truth(name).values()])[0])
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", COMPOSITES)
 def test_data_without_noise_return_the_truth(comm, shared_path, name):
     """The four composites, within eight evaluations; intervals and shares are those of the normal equations."""
@@ -41,6 +42,7 @@ def test_data_without_noise_return_the_truth(comm, shared_path, name):
         assert own["shares"] == pytest.approx(shares[:, k], abs=1e-3)
 
 
+@pytest.mark.one_rank
 def test_a_shear_modulus_is_fitted_to_plies_that_were_made_with_a_ratio(comm, shared_path):
     name, key = "AS4/3501-6", "material.fibre.nu_transverse"
     document = fit(name, model(name, comm)([*truth(name).values()])[0])
@@ -50,13 +52,14 @@ def test_a_shear_modulus_is_fitted_to_plies_that_were_made_with_a_ratio(comm, sh
     assert found["estimate"] == pytest.approx(14.0 / (2 * 1.25), rel=1e-6)
 
 
+@pytest.mark.one_rank
 def test_warnings_of_the_first_cases_are_printed_once_and_kept(comm, shared_path, glass, capsys):
     document = glass | {"petsc": {"feti_ksp_rtol": 2e-7}}
     kept = run_fit(document, shared_path / "out", comm, quiet=False)["warnings"]
     printed = capsys.readouterr().out.splitlines()
     assert len(kept) == 1 and kept[0].startswith("-feti_ksp_rtol 2e-07 asks for less than the checks do")
     assert printed.count(f"warning: {kept[0]}") == (comm.rank == 0)
-    sweep = {name: document[name] for name in ("cell", "analysis", "petsc")}
+    sweep = {name: document[name] for name in ("cell", "analysis", "petsc")} | {"output": {"fields": False}}
     sweep["material"] = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
     run_sweep(sweep | {"sweep": {"cell": {"refine": [0, 1]}}}, shared_path / "sweep", comm, quiet=False)
     printed = capsys.readouterr().out.splitlines()
@@ -111,6 +114,7 @@ def stamps(out: Path) -> dict[str, int]:
     return {str(path): path.stat().st_mtime_ns for path in out.glob("evaluation-*/case-*/result.json")}
 
 
+@pytest.mark.one_rank
 def test_tests_share_unknowns_and_fractions_are_fitted(comm, shared_path, glass):
     """Two patterns at an unknown fraction, on groups of ranks, without differences."""
     document = copy.deepcopy(glass)
@@ -160,6 +164,7 @@ FIBRE_THAT_DEBONDS = {
 }  # fmt: skip
 
 
+@pytest.mark.one_rank
 def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, shared_path):
     """Derivatives by the scaling law are those of a central difference; the fit returns the toughness."""
     document = copy.deepcopy(FIBRE_THAT_DEBONDS)

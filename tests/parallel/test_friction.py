@@ -21,6 +21,7 @@ SOFTENING |= {"normal_toughness": 4e-5, "tangential_toughness": 6e-5}
 PHASES = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
 
 
+@pytest.mark.one_rank
 def test_one_fibre_slides_as_in_a_prototype(comm):
     """Stresses at the waypoints within 0.3 % of the largest, heat within 2 % on elements of 1.3."""
     cell = {"geometry": "square", "fibre_radius": 7.5, "mesh_size": 0.08, "interface_size": 0.06, "refine": 1}
@@ -36,6 +37,7 @@ def test_one_fibre_slides_as_in_a_prototype(comm):
     assert np.abs(work - stored - heat).max() < 1e-10 * work.max() and (np.diff(heat) >= -1e-14).all()
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("waypoints", "springs"),
     [
@@ -62,15 +64,16 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
         assert point.friction_heat == pytest.approx(expected[k].heat, abs=1e-7 * most * 0.01)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("plane", "law"),
-    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING | {"friction_on_damage": True})],
-    ids=["strength", "softening", "generalized"],
+    [("strain", {}), ("generalized", SOFTENING)],
+    ids=["strength", "generalized, softening"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):
     interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3} | law
     interface |= {"debonded": [{"fibre": 1, "angle": 360.0}, {"fibre": 2, "angle": 90.0}]}
-    cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.15}
+    cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.2}
     path = {"waypoints": [{"S11": -0.05}, {"gamma12": 0.03}, {"gamma12": -0.02}, {"S11": 0.02}]}
     if plane == "generalized":
         cold = {"temperature": -200.0, "E33": 0.0}
@@ -117,6 +120,7 @@ def numbers_at_ends(points, legs):
     return np.array([[*p.stress, p.friction_heat] for p in points if is_end(p, legs)])
 
 
+@pytest.mark.one_rank
 def test_increments_tend_to_events_and_obey_every_law(comm, shared_path):
     """Loops of a debonded fibre beside bonds that soften and rub: four times the steps, less than half the error."""
     waypoints = [{"E11": -0.01, "E22": -0.006}, {"gamma12": 0.03}, {"gamma12": -0.03}, {"gamma12": 0.01}]

@@ -12,7 +12,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog import Case, run
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
 GLASS_EPOXY = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
 PRESSED = [[-0.01, -0.004, 0.0], [-0.01, -0.004, 0.02], [-0.01, -0.004, -0.02]]

@@ -133,25 +133,25 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     parallel_assert(comm, not list(out.glob("*.part")))
 
 
-@pytest.mark.parametrize("name", ["cell.png", "path.gif"])
-def test_pictures_that_do_not_fit_are_reported(comm, shared_path, capsys, monkeypatch, name):
+def test_pictures_that_do_not_fit_are_reported(comm, shared_path, capsys, monkeypatch):
     """The results stay, the old picture too."""
     if comm.size > 1:
         pytest.skip("one rank draws")
     out, commit = shared_path / "out", atomic.commit
     assert run(comm, shared_path, out, PATH) == 0
-    (out / name).write_text("old")
+    for name in ("cell.png", "path.gif"):
+        (out / name).write_text("old")
 
-    def full(part, path):
-        if path.name == name:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        commit(part, path)
+        def full(part, path, name=name):
+            if path.name == name:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            commit(part, path)
 
-    monkeypatch.setattr(atomic, "commit", full)
-    capsys.readouterr()
-    assert cli.main(["plot", str(out)]) == 1
-    told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
-    assert (out / name).read_text() == "old" and not list(out.glob("*.part"))
+        monkeypatch.setattr(atomic, "commit", full)
+        capsys.readouterr()
+        assert cli.main(["plot", str(out)]) == 1
+        told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
+        assert (out / name).read_text() == "old" and not list(out.glob("*.part"))
 
 
 def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):

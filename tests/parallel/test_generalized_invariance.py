@@ -79,16 +79,6 @@ def test_cell_turns_with_its_phases(result_of):
     assert error(after.thermal_expansion, rotated_strain(before.thermal_expansion, np.pi / 2)) < EXACT
 
 
-@pytest.mark.parametrize(
-    "cell", [{"geometry": "random", "fibres": 3, "min_gap": 0.15}, {"geometry": "hexagonal"}], ids=str
-)
-@pytest.mark.parametrize("contact", [None, False])
-def test_stiffness_is_symmetric_and_positive(comm, cell, contact):
-    sections = {} if contact is None else {"interface": ARC["interface"] | {"contact": contact}}
-    C = solved(comm, **PHASES, sections=sections, **cell).effective_stiffness
-    assert np.abs(C - C.T).max() < EXACT * np.abs(C).max() and np.linalg.eigvalsh((C + C.T) / 2).min() > 0
-
-
 def test_plane_strain_is_a_block(comm):
     cell = {"geometry": "hexagonal", "mesh_size": 0.2, "fibre_fraction": 0.4}
     phases = {name: {k: v for k, v in phase.items() if k != "expansion"} for name, phase in PHASES.items()}

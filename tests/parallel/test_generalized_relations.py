@@ -3,7 +3,6 @@
 Where the fields of two phases are uniform, or those of layers, finite elements of any size have no error.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,11 @@ from reference.spatial_forms import (
     laminate,
     law,
     levin,
-    rotated,
-    rotated_strain,
 )
 from support.generalized_phases import CARBON, CRYSTAL, WOOD
 from support.ranks import write_once
 from support.spatial_cells import EPOXY, GLASS, error, solved
-from unit.mesh.faulty_meshes import FIBRE, MATRIX, N, grid
+from unit.mesh.faulty_meshes import grid
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -67,15 +64,6 @@ def test_axial_constants_and_expansion_follow_from_the_rest(comm, cell, fibre):
     assert error(result.thermal_expansion, levin(EPOXY, fibre, c, S)) < EXACT
 
 
-@pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
-def test_expansion_of_orthotropic_phases_follows_from_the_compliance(comm, cell):
-    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, **cell)
-    assert error(result.thermal_expansion, levin(WOOD, CRYSTAL, fractions(result), result.compliance)) < EXACT
-    # The definition: no stress under these strains and a unit of temperature.
-    free = result.effective_stiffness @ result.thermal_expansion + result.thermal_stress
-    assert np.abs(free).max() < EXACT * np.abs(result.thermal_stress).max()
-
-
 @pytest.mark.parametrize("phase", [EPOXY, CARBON, WOOD, CRYSTAL], ids=["epoxy", "carbon", "wood", "crystal"])
 @pytest.mark.parametrize("cell", [ARRANGEMENTS["square"], ARRANGEMENTS["hexagonal"]], ids=["square", "hexagonal"])
 def test_homogeneous_cell_is_its_phase(comm, cell, phase):
@@ -99,50 +87,16 @@ def test_homogeneous_cell_without_a_plane_of_symmetry_across(comm):
     assert error(result.thermal_expansion, np.array([1.0, -2.0, 3.0, 0, 0, 0])) < EXACT
 
 
-def strips(where):
-    """Return a mesh of a 4 x 4 grid with a quarter of fibre: straight strips, or strips along the diagonal."""
-    if where == "diagonal":
-        mesh = grid(lambda x, y: int(N * x) == int(N * y))
-        # The upper halves beside the strip take the place of those in it.
-        upper = {2 * (i + N * j) + 2: (j - i) % N for i in range(N) for j in range(N)}
-        phase = {tag: FIBRE if across == N - 1 else MATRIX for tag, across in upper.items()}
-        elements = {tag: (e[0], phase.get(tag, e[1]), phase.get(tag, e[2]), e[3]) for tag, e in mesh.elements.items()}
-        return replace(mesh, elements=elements)
-    return grid((lambda x, y: 0.25 < x < 0.5) if where == 0 else (lambda x, y: 0.25 < y < 0.5))
-
-
-def written(comm, folder, where):
-    """Return the mesh file of `strips`, as keys of a cell. Collective."""
-    write_once(comm, strips(where), folder / "strips.msh")
-    return {"geometry": "mesh", "file": "strips.msh", "folder": folder}
-
-
 @pytest.mark.parametrize(("order", "across"), [(1, 0), (2, 1)])
 @pytest.mark.parametrize("springs", [None, (700.0, 150.0), (3.0, 0.2)], ids=str)
 def test_laminate_is_exact(comm, shared_path, across, order, springs):
     keys = ("normal_stiffness", "tangential_stiffness")
     sections = {"interface": dict(zip(keys, springs, strict=True))} if springs else {}
-    cell = written(comm, shared_path, across)
-    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, order=order, sections=sections, **cell)
+    write_once(comm, grid(lambda x, y: 0.25 < (x, y)[across] < 0.5), shared_path / "strips.msh")
+    cell = {"geometry": "mesh", "file": "strips.msh", "folder": shared_path, "order": order}
+    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, sections=sections, **cell)
     C, thermal = laminate([law(WOOD), law(CRYSTAL)], [0.75, 0.25], across, springs or (np.inf, np.inf))
     assert error(result.effective_stiffness, C) < EXACT and error(result.thermal_stress, thermal) < EXACT
-
-
-def test_laminate_along_a_diagonal_is_exact(comm, shared_path):
-    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, **written(comm, shared_path, "diagonal"))
-    # Normal to (1, -1): a laminate normal to x1 of phases that are turned back, turned by -45 degrees.
-    turn = -np.pi / 4
-    phases = [(rotated(C, -turn), rotated_strain(alpha, -turn)) for C, alpha in (law(WOOD), law(CRYSTAL))]
-    C, thermal = laminate(phases, fractions(result), 0)
-    expansion = rotated_strain(-np.linalg.solve(C, thermal), turn)
-    assert fractions(result) == pytest.approx([0.75, 0.25])
-    assert error(result.effective_stiffness, rotated(C, turn)) < EXACT
-    assert error(result.thermal_expansion, expansion) < EXACT
-
-
-def test_phases_of_one_expansion_expand_alike(comm):
-    result = solved(comm, matrix=EPOXY | {"expansion": 7.0}, fibre=GLASS | {"expansion": 7.0}, geometry="hexagonal")
-    assert error(result.thermal_expansion, 7.0 * ONES) < EXACT
 
 
 @pytest.mark.parametrize("springs", [1e-3, 1.0, 1e3])

@@ -68,26 +68,30 @@ def test_bonded_cell_has_the_stiffness_of_its_twin(comm, case, sections):
     assert (C[np.ix_([0, 1, 2, 5], [3, 4])] == 0).all()
 
 
+@pytest.mark.one_rank
 def test_three_phases_of_a_users_mesh(comm):
     phases = {"matrix": WOOD, "fibre": CRYSTAL, "fibre:2": CARBON}
     cell = {"geometry": "mesh", "file": "two_fibres.msh", "folder": MESHES, "order": 2}
     compare(comm, sections={"material": phases}, **cell)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("contrast", "sections"),
-    [(1e-6, {}), (1e6, {}), (1e-6, CUT), (1e6, CUT), (1e-3, CUT)],
-    ids=["whole 1e-6", "whole 1e6", "cut 1e-6", "cut 1e6", "cut 1e-3"],
+    [(1e6, {}), (1e-6, CUT), (1e-3, CUT)],
+    ids=["whole 1e6", "cut 1e-6", "cut 1e-3"],
 )
 def test_any_contrast(comm, contrast, sections):
     compare(comm, matrix=CORDIERITE, fibre={"young": contrast, "poisson": 0.2, "expansion": 5e-6}, sections=sections)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("G_axial", [1e-4, 28.0, 1e5])
 def test_fibres_that_shear_along_unlike_across(comm, G_axial):
     compare(comm, fibre=CARBON | {"G_axial": G_axial}, geometry="hexagonal")
 
 
+@pytest.mark.one_rank
 def test_nearly_incompressible_matrix(comm):
     compare(comm, matrix={"young": 3.0, "poisson": 0.4999, "expansion": 50.0}, order=2, mesh_size=0.3)
 
@@ -95,16 +99,19 @@ def test_nearly_incompressible_matrix(comm):
 OPEN = [("all", 20.0, 80.0)], [(1, 20.0, 80.0), (2, -100.0, 200.0)], [(1, 0.0, 360.0)], [("all", 0.0, 360.0)]
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("given", OPEN, ids=str)
 def test_free_faces(comm, given):
     compare(comm, **ORTHOTROPIC, geometry="hexagonal", sections=arcs(*given, contact=False))
 
 
+@pytest.mark.one_rank
 def test_free_faces_of_curved_elements(comm):
     sections = arcs((1, 20.0, 80.0), (2, 0.0, 360.0), contact=False)
     compare(comm, **ORTHOTROPIC, geometry="hexagonal", order=2, mesh_size=0.3, tip_size=0.2, sections=sections)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     "springs",
     [SPRINGS, {"normal_stiffness": 0.5, "tangential_stiffness": 2.0}, dict.fromkeys(SPRINGS, 1e5)],
@@ -115,10 +122,12 @@ def test_elastic_interfaces(comm, springs, given):
     compare(comm, **ORTHOTROPIC, geometry="hexagonal", sections=arcs(*given, contact=False, **springs))
 
 
+@pytest.mark.one_rank
 def test_elastic_interfaces_of_curved_elements(comm):
     compare(comm, **ORTHOTROPIC, order=2, mesh_size=0.3, sections=arcs(**SPRINGS) | CUT)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("given", [OPEN[0], OPEN[2]], ids=["arc", "whole"])
 @pytest.mark.parametrize("springs", [{}, SPRINGS], ids=["glue", "springs"])
 def test_contact(comm, given, springs):
@@ -135,6 +144,7 @@ def test_contact_by_any_preconditioner(comm, pc):
     compare(comm, mesh_size=0.25, tip_size=0.1, petsc={"feti_pc_type": pc}, sections=arcs(("all", 0.0, 90.0)) | CUT)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("expansions", "angle"),
     [((5e-6, 1e-7), 80.0), ((1e-7, 5e-6), 360.0), ((2.0, 2.0), 80.0), ((0.0, 0.0), 360.0), ((0.0, 1.0), 80.0)],
@@ -151,10 +161,12 @@ def test_contact_under_a_temperature(comm, expansions, angle):
 WHOLE = {"decomposition": {"subdomains": 2}}
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
-    "sections", [CUT, arcs((1, 20.0, 150.0)) | WHOLE, arcs((1, 0.0, 360.0)) | WHOLE], ids=["cut", "arc", "whole"]
+    ("sections", "soft"),
+    [(CUT, "fibre"), (arcs((1, 20.0, 150.0)) | WHOLE, "matrix"), (arcs((1, 0.0, 360.0)) | WHOLE, "fibre")],
+    ids=["cut", "arc", "whole"],
 )
-@pytest.mark.parametrize("soft", ["matrix", "fibre"])
 def test_a_soft_phase_alone_expands(comm, soft, sections):
     """At the default tolerance: what it would do alone is what errors are small parts of."""
     phases = {name: {"young": 450.0, "poisson": 0.0, "expansion": 0.0} for name in ORTHOTROPIC}
@@ -164,6 +176,7 @@ def test_a_soft_phase_alone_expands(comm, soft, sections):
     )
 
 
+@pytest.mark.one_rank
 def test_what_strains_no_phase_across_closes_nothing(comm):
     """Without Poisson's effect E33 makes neither forces nor gaps."""
     phases = {"matrix": {"young": 1.0, "poisson": 0.0}, "fibre": {"young": 10.0, "poisson": 0.0}}
@@ -195,6 +208,7 @@ def random_phase(rng):
     return {"stiffness": ((C + C.T) / 2).tolist(), "expansion": rng.normal(size=3).tolist()}
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("contact", [False, True])
 def test_stiffness_at_every_opening(comm, contact):
     debonded = [{"fibre": "all", "centre": 15.0}]

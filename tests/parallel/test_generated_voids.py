@@ -13,7 +13,7 @@ from feti_homog import run
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 VOID = {"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}
 OVAL = {"x": 0.5, "y": 0.02, "a": 0.16, "b": 0.08, "angle": 30.0, "phase": "void"}
@@ -40,6 +40,7 @@ def solved(comm, cell, plane="strain", fibre=True, folder=Path(), out=None, **se
     return run(cases.parse(_document(cell, plane, fibre) | sections, folder), comm, out=out)
 
 
+@pytest.mark.one_rank
 @pytest.mark.quick
 @pytest.mark.parametrize("decomposition", [{}, {"subdomains": 5}])
 def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, decomposition):
@@ -58,6 +59,7 @@ def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, deco
     assert relative_error(own.effective_stiffness, other.effective_stiffness) < 1e-9
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("a", "b"), [(0.04, 0.04), (0.06, 0.03), (0.02, 0.06)])
 def test_a_small_elliptic_void_softens_as_the_dilute_limit_says(comm, a, b):
     """Compliances of plane stress grow in proportion to the area of an ellipse [Kachanov 1993].
@@ -84,7 +86,7 @@ def test_voids_soften_and_their_cells_are_certified(comm, shared_path, plane):
     assert_certified(comm, shared_path / "run")
 
 
-@pytest.mark.few_ranks
+@pytest.mark.one_rank
 def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
     random = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "seed": 4, "mesh_size": 0.15, "voids": 0.05}
     sections = {
@@ -97,6 +99,7 @@ def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
     assert_certified(comm, shared_path / "run")
 
 
+@pytest.mark.one_rank
 def test_an_accuracy_counts_free_faces_of_voids():
     """With them a cell of hardly any contrast needs more."""
     document = {"material": {"matrix": MATRIX, "fibre": MATRIX}, "analysis": {"type": "stiffness", "plane": "strain"}}
@@ -107,6 +110,7 @@ def test_an_accuracy_counts_free_faces_of_voids():
     assert void.cell.refine > plain.cell.refine == 0
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
     """The void has the inner radius of the tube, on another mesh."""
@@ -117,6 +121,7 @@ def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
     assert relative_error(tube.effective_stiffness, hole.effective_stiffness) < {1: 4e-3, 2: 1e-4}[order]
 
 
+@pytest.mark.one_rank
 def test_hollow_fibres_have_the_monolithic_stiffness(comm):
     rows = [VOID, ROWS[1] | {"inner_radius": 0.15}, {"x": 0.0, "y": 0.5, "radius": 0.15, "inner_radius": 0.05}]
     for pieces in ({}, {"decomposition": {"subdomains": 6}}):

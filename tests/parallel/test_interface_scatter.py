@@ -30,7 +30,7 @@ PATH = {"to": {"E11": 0.1, "E22": 0.0, "gamma12": 0.02}}
 ENVELOPE = {"plane": ["S11", "S12"], "directions": 8}
 
 
-def case_of(interface, rows, mesh_size=0.2, **analysis):
+def case_of(interface, rows, mesh_size=0.25, **analysis):
     """Return a case of three fibres; `rows` is what their table has beside circles."""
     (kind,) = analysis
     circles = [{"x": x, "y": y, "radius": 0.7} for x, y in CENTRES]
@@ -58,8 +58,8 @@ def weibull(shape, seed, n=3):
     return law.ppf(stream.random(n)) / law.mean()
 
 
+@pytest.mark.one_rank
 @pytest.mark.parallel
-@pytest.mark.few_ranks
 @pytest.mark.parametrize(
     "law, column, analysis",
     [
@@ -97,6 +97,7 @@ def test_fibres_break_as_with_interfaces_of_their_own(comm, shared_path, law, co
     assert certificate.holds, certificate
 
 
+@pytest.mark.one_rank
 def test_factors_are_of_the_fibre_alone():
     """Factors have mean 1 and the right coefficient of variation; other fibres or seeds do not matter."""
     case = case_of(STRENGTH | {"scatter": {"shape": 8.0, "seed": 3}}, [{}] * 3, path=PATH)

@@ -13,7 +13,7 @@ from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 360.0}]}
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
@@ -40,6 +40,7 @@ def result(comm, geometry="hexagonal", phases=(MATRIX, FIBRE), plane="strain", *
     return run(Case.parse(document | more), comm)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", SIZES)
 @pytest.mark.parametrize(
     ("known", "interface"),

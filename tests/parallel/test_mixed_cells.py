@@ -9,7 +9,7 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 RANDOM = {"geometry": "random", "seed": 3, "mesh_size": 0.1}
 STIFF = {"young": 400.0, "poisson": 0.1}

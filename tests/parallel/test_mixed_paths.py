@@ -30,6 +30,7 @@ PROPORTIONAL = {
 }
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", PROPORTIONAL)
 def test_proportional_paths_are_those_of_brute_force(comm, name):
     plane, cell, interface, to = PROPORTIONAL[name]
@@ -45,6 +46,7 @@ LEGS = {
 }
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", LEGS)
 def test_later_legs_are_those_of_brute_force(comm, name):
     plane, interface, waypoints = LEGS[name]
@@ -86,6 +88,7 @@ def name_of(letter, pair):
     return ("gamma" if letter == "E" and pair[0] != pair[1] else letter) + pair
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("to", [{"E11": 0.01, "S22": -0.02}, {"S11": 0.04, "S12": -0.03}], ids=str)
 def test_a_longer_way_in_the_same_direction_has_the_same_events(comm, to):
     case = {"cell": HEXAGONAL, "phases": EPOXY_GLASS, "plane": "strain", "interface": QUADRATIC}
@@ -126,6 +129,7 @@ def test_stresses_that_nothing_carries_any_more_are_reported(comm, strip):
         solved(comm, strip, **case, interface=STRENGTH, path={"to": {"S11": 0.1}})
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("worst_only", [True, False])
 def test_increments_are_those_of_brute_force(comm, worst_only):
     waypoints = [{"temperature": -60.0}, {"S11": 0.03}, {"gamma13": 0.02, "E11": 0.0}]

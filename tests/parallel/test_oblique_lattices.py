@@ -7,7 +7,7 @@ from support.base_case import BASE
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05\n'
 FINE = "mesh_size = 0.12\nrefine = 1\norder = 2\n"
 

@@ -65,6 +65,7 @@ def closed_form(phases, across, plane, interface):
     return PartedLayers(EPOXY_GLASS, (1 - share, share), plane, across, give)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", PATHS)
 def test_layers_part_close_and_part_again_exactly(comm, shared_path, name):
     phases, across, plane, interface, petsc, path = PATHS[name]
@@ -90,6 +91,7 @@ def test_layers_part_close_and_part_again_exactly(comm, shared_path, name):
     assert_certified(comm, shared_path / "out")
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("phases", [TWO, NINE])
 def test_layers_touch_where_the_strain_is_zero(comm, shared_path, phases):
     result = solved(comm, shared_path, phases, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
@@ -128,10 +130,14 @@ UNDETERMINED = {
     "all named": ("generalized", {"E11": 0.1, "gamma12": 0.0, "gamma13": 0.0, "S22": 0.1}, None),
     "along the fibres too": ("generalized", {"S22": 0.1}, "E11, gamma13, gamma12"),
 }
+SOME = ("pressed", "in space")
 
 
-@pytest.mark.parametrize("name", UNDETERMINED)
-@pytest.mark.parametrize(("phases", "materials"), [(TWO, EPOXY_GLASS), (SIX, EPOXY_GLASS[:1] * 2)], ids=["two", "six"])
+@pytest.mark.one_rank
+@pytest.mark.parametrize(
+    ("name", "phases", "materials"),
+    [*((name, TWO, EPOXY_GLASS) for name in UNDETERMINED), *((name, SIX, EPOXY_GLASS[:1] * 2) for name in SOME)],
+)
 def test_strains_that_nothing_determines_are_named(comm, shared_path, phases, materials, name):
     plane, to, names = UNDETERMINED[name]
     result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, len(phases), load={"to": to})
@@ -146,6 +152,7 @@ def test_undetermined_strains_of_a_path_are_counted_and_a_loose_fibre_leaves_non
     assert not any("undetermined" in remark for remark in run(Case.parse(case), comm).remarks)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("back", [{"E11": -0.01}, {"S11": -0.01}], ids=str)
 def test_a_fibre_that_comes_free_is_pressed_again(comm, back):
     weak = {"normal_strength": 1e-4, "tangential_strength": 1e-4}

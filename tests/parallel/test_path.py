@@ -73,9 +73,10 @@ def is_certified(points):
 ASKED = [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)]
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("cell", "criterion", "contact", "strain"),
-    [(cell, *ASKED[(number + turn) % 4]) for number, cell in enumerate(CELLS) for turn in (0, 1, 3)],
+    [(cell, *ASKED[(number + turn) % 4]) for number, cell in enumerate(CELLS) for turn in (0, 1)],
     ids=lambda value: next((name for name, cell in NAMES.items() if value is cell), None),
 )
 def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterion, contact, strain):
@@ -151,6 +152,7 @@ def test_bonds_never_heal_and_every_break_dissipates(built, contact):
         assert drop @ SHEAR > -1e-9 * np.abs(drop).max()
 
 
+@pytest.mark.one_rank
 def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(torn):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
     cell = torn(**SQUARE)
@@ -158,17 +160,18 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
     begin = unloaded(CoupledInterfaces(interface), intact(cell))
-    for steps in (10, 40, 160):
+    for steps in (10, 40):
         found = curve(cell, list(increments(CoupledInterfaces(interface), law, strains(strain), steps, True, begin)))[
             :, :2
         ]
         assert relative_error(found[:, 1], rising(exact, found[:, 0])) < 1e-7
         errors.append(np.abs(np.interp(loads, *np.vstack([[0, 0], found]).T) - rising(exact, loads)).mean())
     # A drop within a step h is smeared over it: an error of between a quarter and a half of the drop times h.
-    constants = np.array(errors) * [10, 40, 160]
+    constants = np.array(errors) * [10, 40]
     assert constants.max() < 2.1 * constants.min()
 
 
+@pytest.mark.one_rank
 def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
     cell = torn(**SQUARE)
     law, strain = MaxStrength(0.05, 0.05), np.array([[1e-3, 0.0, 0.0]])
@@ -195,6 +198,7 @@ def rising(exact, loads):
     return loads * (exact[:, 1] / exact[:, 0])[first]
 
 
+@pytest.mark.one_rank
 def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     case = torn_cells.build(comm, **SQUARE)
     law, waypoints = MaxStrength(20.0, 30.0), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]

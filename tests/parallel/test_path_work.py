@@ -48,6 +48,7 @@ def test_work_is_stored_or_lost(comm, plane, springs):
         assert own and all(abs(work[k] - work[k - 1] - dW) < EXACT * np.abs(work).max() for k, dW in own)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("plane", ["strain", "generalized"])
 def test_a_path_back_without_breaks_is_the_way_there(comm, plane):
     """To no load and back, or the elastic strain of it: through contact, at no net work."""
@@ -70,6 +71,7 @@ def test_a_path_back_without_breaks_is_the_way_there(comm, plane):
         assert (after.open, after.closed) == (before.open, before.closed)
 
 
+@pytest.mark.one_rank
 def test_a_cycle_without_breaks_closes(comm):
     waypoints = [
         {"S11": -0.02, "S22": 0.01},
@@ -88,6 +90,7 @@ def test_a_cycle_without_breaks_closes(comm):
     assert max(p.closed for p in path) > min(p.closed for p in path)
 
 
+@pytest.mark.one_rank
 def test_cooling_a_free_cell_does_no_work_but_on_the_temperature(comm):
     """The work of the temperature is the stored energy: phases that expand alike store none."""
     alike = tuple(phase | {"expansion": 2e-5} for phase in EPOXY_GLASS)

@@ -13,7 +13,7 @@ from feti_homog import Case, run
 from feti_homog.materials import voigt
 from feti_homog.report.text import phase_tables
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15, "refine": 1}
 LOAD = {"S11": 30.0, "S22": -12.0, "S33": 5.0, "S23": 7.0, "S13": -9.0, "S12": 11.0}
@@ -75,6 +75,7 @@ def angular(x, y):
     return (0.25 < x < 0.75 and 0.25 < y < 0.5) or (0.25 < x < 0.5 and 0.25 < y < 0.75)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_moved_and_a_turned_cell_have_the_same_stresses(comm, shared_path, order):
     """On the torus, by a quarter and a half of the cell; by a quarter turn, which swaps S11 and S22."""
@@ -139,6 +140,7 @@ def test_a_soft_phase_keeps_its_stresses_and_a_free_fibre_has_none(comm):
     assert phases_of(comm, {"E11": 0.01}, plane="strain", **free)["fibre"].von_mises == 0.0
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", [1, 2])
 def test_unit_loads_together_have_the_stresses_of_each_alone(comm, order):
     more = {"fibre": FIBRE | {"young": 20.0}, "strengths": ({"tension": 8.0, "compression": 12.0}, AXES)}

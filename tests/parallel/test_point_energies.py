@@ -151,6 +151,7 @@ def test_a_laminate_loses_all_that_it_stores_at_once(comm, shared_path, growth):
 TOLERANCES = {"released": 0.02, "springs": 0.03}
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("growth", TOLERANCES)
 def test_along_the_snap_back_toughness_times_length_is_dissipated_on_fine_meshes(comm, growth):
     """Growth by the energy that is released dissipates little more on any; by springs it takes fine elements."""
@@ -178,6 +179,7 @@ PATHS = {
 }
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("path", PATHS)
 def test_without_sensitivity_to_the_mode_toughness_times_length_is_counted_exactly(comm, path):
     """Bonds that break together, in a cascade or in a step are each counted once, when their length is."""
@@ -196,6 +198,7 @@ def test_without_sensitivity_to_the_mode_toughness_times_length_is_counted_exact
     assert result.points["debonded_length"].shape == (len(result.path), 1)
 
 
+@pytest.mark.one_rank
 def test_the_tips_of_one_debond(comm):
     """Bonds beside those that broke; the one that breaks next is at its toughness and releases its toughness."""
     result = run(path_of(SQUARE | {"mesh_size": 0.05}, BY_ENERGY, strain=[0.03, 0, 0]), comm)
@@ -222,6 +225,7 @@ def test_the_tips_of_one_debond(comm):
     assert checked > 8
 
 
+@pytest.mark.one_rank
 def test_angles_have_energies_and_debonded_lengths(comm):
     cell = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.1}
     document = {

@@ -42,14 +42,16 @@ def stiffness(comm, *rows, **keys):
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize("keys", [{"refine": 1}, {"order": 2}])
-@pytest.mark.parametrize("pieces", [{}, {"decomposition": {"subdomains": 9}}])
+@pytest.mark.parametrize(
+    ("keys", "pieces"), [({"refine": 1}, {}), ({"order": 2}, {"decomposition": {"subdomains": 9}})]
+)
 def test_torn_polygons_have_the_monolithic_stiffness(comm, keys, pieces):
     torn, L, responses = solve(case_of(table(*ROWS, **keys), **pieces), comm)
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-9
     assert max(max(r.checks.values()) for r in responses) < 1e-8
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("sides", [3, 8])
 def test_a_corner_of_one_makes_a_circle(comm, sides):
     row = {"x": 0.5, "y": 0.5, "radius": 0.2 / np.cos(np.pi / sides), "sides": sides, "corner": 1.0}
@@ -58,6 +60,7 @@ def test_a_corner_of_one_makes_a_circle(comm, sides):
     assert relative_error(found, expected) < 1e-5
 
 
+@pytest.mark.one_rank
 def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
     """Compare squares on other nodes; both err at the corners."""
     write_once(comm, grid(), shared_path / "grid.msh")
@@ -67,6 +70,7 @@ def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
     assert relative_error(found, expected) < 1e-3
 
 
+@pytest.mark.one_rank
 def test_turned_cells_have_turned_stiffnesses(comm):
     """A quarter of a turn leaves a square cell of a square alone, and a hexagon's shear coupling changes its sign."""
     square = stiffness(comm, SQUARE | {"corner": 0.3, "angle": 20.0}, order=2, refine=1)
@@ -77,7 +81,7 @@ def test_turned_cells_have_turned_stiffnesses(comm):
     assert relative_error(other[[1, 0, 2]][:, [1, 0, 2]] * np.outer([1, 1, -1], [1, 1, -1]), one) < 1e-4
 
 
-@pytest.mark.few_ranks
+@pytest.mark.one_rank
 def test_polygons_debond_and_are_certified(comm, shared_path):
     sections = {
         "analysis": {"type": "path", "plane": "strain"},

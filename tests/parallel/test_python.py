@@ -1,7 +1,9 @@
 """`from feti_homog import Case, run` in a program of its own: arrays, no files, and communicators of any size."""
 
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
+import convergence
 import h5py
 import numpy as np
 import pytest
@@ -13,9 +15,10 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, FetiHomogError, api, collect_sweep, run, run_sweep
 from feti_homog.results.field_layout import tables
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.runtime.records import plain
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 def with_fraction(fraction, **rest):
@@ -37,6 +40,7 @@ def test_run_gives_the_same_arrays_on_every_rank_and_writes_no_file(comm, shared
     parallel_assert(comm, not list(shared_path.iterdir()))
 
 
+@pytest.mark.one_rank
 def test_what_polygons_lose_is_remarked(comm):
     """A circle of n edges has lost 1 - sin(2 pi / n) / (2 pi / n) of its area."""
     (remark,) = run(with_fraction(0.4, order=1), comm).remarks
@@ -128,6 +132,7 @@ def test_not_quiet_prints_what_the_command_line_prints(comm, capsys):
     parallel_assert(comm, not silent and (whole if comm.rank == 0 else not printed), printed)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("growth", ["released", "springs"])
 def test_a_path_scales_with_the_root_of_its_toughness(comm, growth):
     """Two legs with contact, against a run with that toughness and loads that are as many times larger."""
@@ -245,6 +250,13 @@ def test_faults_and_failures_are_raised_and_the_next_run_works(comm):
     with pytest.raises(ConvergenceError, match="no convergence after 2 iterations"):
         run(with_fraction(0.4, petsc={"feti_ksp_max_it": 2}, decomposition={"cut": "bodies"}), comm)
     assert run(with_fraction(0.4), comm).document["checks"]
+
+
+def test_the_largest_traction_of_a_driver_is_that_of_one_rank(comm, shared_path):
+    given, cell = SimpleNamespace(fields=True, pictures=False), make_case(mesh_size=0.25).resolved()["cell"]
+    found = convergence.traction(given, comm, cell, shared_path / "all")
+    expected = on_root(comm, lambda: convergence.traction(given, MPI.COMM_SELF, cell, shared_path / "one"))
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 ALONE = """

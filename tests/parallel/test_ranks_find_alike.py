@@ -105,3 +105,19 @@ def test_a_path_in_space_by_steps(comm):
 
 def test_bonds_that_soften(comm):
     assert_alike(comm, "softening")
+
+
+def test_faces_that_rub(comm):
+    assert_alike(comm, "friction")
+
+
+def test_slip_along_the_fibres(comm):
+    assert_alike(comm, "axial energy")
+
+
+def test_a_debonded_conductor_with_resistance(comm):
+    assert_alike(comm, "conductance")
+
+
+def test_springs_beside_faces_that_touch(comm):
+    assert_alike(comm, "springs")

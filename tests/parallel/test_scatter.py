@@ -11,13 +11,14 @@ from feti_homog.report.text import study_tables
 from feti_homog.studies import uncertainty
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 MATERIAL = {
     "matrix": {"young": {"mean": 3.0, "cv": 0.01}, "poisson": 0.35},
     "fibre": {"young": {"mean": 70.0, "cv": 0.01}, "poisson": 0.2},
 }
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("temperature", [None, -20.0])
 def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path, temperature):
     """The sum of p df / dp over all stiffnesses, by differences, and the strength, closed, is zero for a strain.

@@ -95,6 +95,7 @@ def moved(case, names, values):
     return changed
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", CASES)
 def test_derivatives_are_those_of_the_answer(comm, name):
     """Along a direction in which every parameter changes, by central differences of three steps, extrapolated."""
@@ -126,6 +127,7 @@ def test_stiffness_is_homogeneous_of_degree_one_in_those_of_all_phases(comm, nam
     np.testing.assert_allclose(total[moduli], found.constant_values[moduli], rtol=1e-10, atol=1e-10 * largest)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("geometry", "plane", "order"), [("hexagonal", "generalized", 2), ("square", "stress", 1)])
 def test_derivatives_by_the_fraction_are_those_of_finer_meshes(comm, geometry, plane, order):
     """Quadratic elements to 1e-3 of the differences of four cells, linear ones as far as their stiffness is right."""

@@ -58,6 +58,7 @@ def law_of(interface):
 KINDS = ("stiffness", "strength", "toughness")
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("name", PATHS)
 def test_paths_are_those_of_brute_force(comm, name):
     plane, others, waypoints = PATHS[name]
@@ -153,6 +154,7 @@ def test_a_wrong_answer_does_not_outlive_the_next_confirmation(comm):
         solved(comm, **case)
 
 
+@pytest.mark.one_rank
 def test_increments_count_bonds_that_soften_once(comm, shared_path):
     """Bonds that lose several teeth in a step are one each: states before and after have as many."""
     path = {"waypoints": [{"E11": 0.012, "gamma12": 0.004}], "method": "increments", "increments": 3}
@@ -193,6 +195,7 @@ def strip(comm, shared_path):
     return stretched, 1.0 / (np.array([0.75, 0.25]) @ (1.0 / moduli))
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("interface", "branch", "energy"),
     [
@@ -222,6 +225,7 @@ def test_a_laminate_follows_its_law_through_snap_back(comm, strip, interface, br
     assert excess[0] > excess[1] > 0.0 and excess[0] / excess[1] == pytest.approx(2.0, rel=0.35)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("to", [{"E11": 3.0, "E22": 0.0, "gamma12": 0.0}, {"E11": 0.0, "E22": 0.0, "gamma12": 5.0}])
 def test_limits_of_the_law(comm, strip, to):
     """One tooth is the energy criterion on springs, the least toughness a strength on them.

@@ -10,7 +10,7 @@ from support.verified_results import document
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 KINDS = ("spatial", "spatial contact", "spatial springs")
 VOIGT = ("S11", "S22", "S33", "S23", "S13", "S12")

@@ -10,7 +10,7 @@ from unit.mesh.faulty_meshes import MshFile, grid
 
 from feti_homog import Case, run
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 EXACT = 1e-9
 SQUARE, HEXAGONAL = {}, {"geometry": "hexagonal"}

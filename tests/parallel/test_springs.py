@@ -41,6 +41,7 @@ def errors(comm, key, **mesh):
     return np.abs(L[[0, 0, 2], [0, 1, 2]] / ELASTIC[key].value - 1)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("key", ELASTIC, ids=str)
 def test_curved_elements_reach_the_published_numbers(comm, key):
     # The softer the springs, the more of the strain is theirs.
@@ -48,6 +49,7 @@ def test_curved_elements_reach_the_published_numbers(comm, key):
     assert errors(comm, key, order=2, mesh_size=0.1, refine=refine).max() < 2e-6
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("key", [("square", 500, 500), ("hexagonal", 10, 2.5)], ids=str)
 def test_linear_elements_converge_to_them(comm, key):
     coarse, fine = (errors(comm, key, order=1, mesh_size=0.1, refine=refine) for refine in (1, 3))
@@ -103,7 +105,7 @@ PIECES = [{}, {"subdomains": 12}]
 @pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
 @pytest.mark.parametrize("preconditioner", ["dirichlet", "influence"])
 def test_iterations_hardly_depend_on_the_springs(comm, preconditioner, pieces):
-    case = {"geometry": "hexagonal", "mesh_size": 0.1, "refine": 1, "order": 2, "decomposition": pieces}
+    case = {"geometry": "hexagonal", "mesh_size": 0.1, "order": 2, "decomposition": pieces}
     case["petsc"] = {"feti_pc_type": preconditioner, "feti_dual_operator": "explicit"}
     glued, _, few = stiffness(comm, **case)
     last = glued
@@ -117,6 +119,7 @@ def test_iterations_hardly_depend_on_the_springs(comm, preconditioner, pieces):
     assert last[0, 0] == pytest.approx(VOID["hexagonal"].value[0], rel=0.01)
 
 
+@pytest.mark.one_rank
 def test_a_neutral_fibre_is_not_seen(comm):
     """2 / (k_n a) = 1 / k_m - 1 / k_f gives the bulk modulus of the matrix in any arrangement."""
     bulk = [phase["young"] / (2 * (1 + phase["poisson"]) * (1 - 2 * phase["poisson"])) for phase in (MATRIX, FIBRE)]
@@ -128,13 +131,14 @@ def test_a_neutral_fibre_is_not_seen(comm):
     assert worst < 1e-5
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.one_rank
+@pytest.mark.parametrize("number", range(4))
 def test_random_cells_equal_the_quadratic_programme(comm, number):
     rng = np.random.default_rng([comm.size, number, 7])
     springs = tuple(10.0 ** rng.uniform(-2, 3, size=2))
     pc = ("dirichlet", "influence")[number % 2]
     case = torn_cells.build(comm, springs=springs, **random_cell(rng), petsc={"feti_pc_type": pc})
-    for _ in range(4):
+    for _ in range(3):
         bonded, strain = random_bonded(rng, case.reference) if case.reference else None, None
         bonded, strain = comm.bcast((bonded, random_strain(rng)))
         contact = bool(comm.bcast(rng.random() < 0.85))

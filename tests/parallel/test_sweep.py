@@ -15,7 +15,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
 from feti_homog.system.parallel.mpi_errors import on_root
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 FRACTIONS = "'cell.fibre_fraction' = {from = 0.1, to = 0.6, step = 0.1}\n"
 

@@ -9,7 +9,7 @@ from support.cases import FIBRE, MATRIX, relative_error, solve
 from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 PHASES = {"matrix": MATRIX, "fibre": FIBRE, "fibre:2": {"young": 400.0, "poisson": 0.1}}
 RANDOM = {"geometry": "random", "fibre_fraction": 0.45, "fibres": 8, "seed": 3, "radius_spread": 0.2}

@@ -58,7 +58,7 @@ def cell_of(comm: Any, path: Any, mesh: MshFile, **cell: Any) -> dict[str, Any]:
     return {"geometry": "mesh", "file": str(path / "pixels.msh")} | cell
 
 
-@pytest.mark.parametrize("size, refine, order", [(8, 0, 1), (8, 1, 1), (8, 0, 2), (32, 0, 1)])
+@pytest.mark.parametrize("size, refine, order", [(8, 1, 1), (8, 0, 2), (32, 0, 1)])
 def test_bonded_bodies_that_touch_are_one_solid(comm: Any, shared_path: Any, size: int, refine: int, order: int):
     """Against one solve without tearing, with nodes on the pixels and off them."""
     stiffness = []
@@ -72,6 +72,7 @@ def test_bonded_bodies_that_touch_are_one_solid(comm: Any, shared_path: Any, siz
     assert all(relative_error(L, stiffness[0]) < 1e-8 for L in stiffness[1:2])
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("debonded", [False, True])
 def test_symmetries_of_the_square_turn_the_response(comm: Any, shared_path: Any, debonded: bool):
     image, found = random_image(8, 2), []
@@ -128,7 +129,8 @@ def reference_stress(mesh: MshFile, springs: dict[str, float]) -> tuple[np.ndarr
     return state.stress, len(bodies.held)
 
 
-@pytest.mark.parametrize("seed, springs", [(1, {}), (2, {}), (3, SPRINGS)], ids=str)
+@pytest.mark.one_rank
+@pytest.mark.parametrize("seed, springs", [(1, {}), (3, SPRINGS)], ids=str)
 def test_debonded_bodies_that_touch_are_in_equilibrium(comm: Any, shared_path: Any, seed: int, springs: Any):
     """Against a quadratic programme that counts the sectors of each body by itself; by as much as nodes move."""
     stresses = []
@@ -163,6 +165,7 @@ def test_results_of_every_kind_obey_their_laws(comm: Any, shared_path: Any, kind
     assert result.status == "done" and certificate.holds, certificate.text
 
 
+@pytest.mark.one_rank
 def test_tips_do_not_cross_voids(comm: Any, shared_path: Any):
     """A fibre's side at a void ends at interface nodes, and is no interface."""
     image = random_image(8, 208, 0.5, 2, 0.1)
@@ -171,7 +174,7 @@ def test_tips_do_not_cross_voids(comm: Any, shared_path: Any):
         "material": {"matrix": MATRIX, "fibre": FIBRE},
         "analysis": {"type": "path", "plane": "strain"},
         "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02},
-        "path": {"strain": [0.06, 0.0, 0.02], "method": "increments", "increments": 4},
+        "path": {"strain": [0.06, 0.0, 0.02], "method": "increments", "increments": 2},
     }
     run(Case.parse(document), comm, out=shared_path / "out")
     certificate = on_root(comm, verify, shared_path / "out")

@@ -53,6 +53,7 @@ def test_traces_of_few_dofs_keep_them_all(torn):
         assert np.array_equal(P.toarray(), np.eye(len(dofs)))
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("pieces", "seeds"), [(17, [1]), (24, [4, 6])], ids=["whole", "cut"])
 def test_coarser_traces_find_as_good_modes(comm, pieces, seeds):
     """At most two iterations more on the mean of cells; of nine cells that were cut it was 0 to 3, 1.9 on the mean."""

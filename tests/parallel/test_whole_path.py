@@ -33,6 +33,7 @@ FOUR = {
 STRAIN = np.array([1.0, 0.1, 0.05])
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("growth", ["released", "springs"])
 def test_whole_paths_are_those_of_brute_force(comm, built, growth):
     expected = None

@@ -55,6 +55,7 @@ def case(kind, unit=1.0, mesh_size=0.3):
     })  # fmt: skip
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("kind", [kind for kind in CASES if kind != "beyond"])
 def test_a_path_that_returns_to_zero_stress_is_done(comm, shared_path, kind):
     # On this mesh of one rank rounding is larger than the limits of verify.

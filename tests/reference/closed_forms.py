@@ -75,12 +75,6 @@ def dilute_slopes(matrix, fibre):
     return np.array([1 / (1 / (k_f - k) + 1 / (k + mu)), 1 / (1 / (mu_f - mu) + zeta(k, mu))])
 
 
-def hashin_shtrikman(matrix, fibre, c):
-    """k = k_m + c/(1/(k_f - k_m) + (1 - c)/(k_m + mu_m)), mu alike with zeta: `matrix` surrounds `fibre`."""
-    (k, mu), (k_f, mu_f) = bulk_and_shear(matrix), bulk_and_shear(fibre)
-    return k + c / (1 / (k_f - k) + (1 - c) / (k + mu)), mu + c / (1 / (mu_f - mu) + (1 - c) * zeta(k, mu))
-
-
 def zeta(k, mu):
     """(k + 2 mu) / (2 mu (k + mu))."""
     return (k + 2 * mu) / (2 * mu * (k + mu))

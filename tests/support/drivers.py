@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.image import imread
 
-from support.jobs import mpirun
+from support.jobs import ROOT
+from support.standing_jobs import standing_job
 
 
-def driven(name: str, folder: Path, *options: str) -> list[dict[str, str]]:
-    """Run a driver and return its table."""
-    job = mpirun(2, f"drivers/{name}.py", "--quick", "--out", folder, *options)
+def driven(name: str, folder: Path, *options: str, ranks: int = 1) -> list[dict[str, str]]:
+    """Run a driver and return its table; what all do on several ranks is in one module."""
+    job = standing_job(ranks).run(ROOT / f"drivers/{name}.py", "--quick", "--out", folder, *options)
     assert job.returncode == 0, job.stderr
     assert job.stdout.split()[-2:] == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
     picture = imread(folder / f"{name}.png")
