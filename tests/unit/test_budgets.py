@@ -14,10 +14,10 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs and their messages; the third: conductivity.
+# begun runs and their messages; the third: conductivity; then: checkpoints with wrong numbers.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 130 + 110,
+    "analysis": 3000 + 130 + 110 + 70,
     "case": 2880 + 45 + 30,
     "commands": 560 + 15,
     "fem": 1150 + 5,
@@ -28,13 +28,13 @@ LINES = {
     "mesh": 5500,
     "microstructure": 2140,
     "report": 3420 + 170 + 50,
-    "results": 2430 + 85,
+    "results": 2430 + 85 + 5,
     "schema": 430,
     "studies": 2950,
     "system": 1770 + 5,
     "verify": 3100 + 170 + 50,
 }
-FILES, TOTAL = 310, 45000 + 370 + 370
+FILES, TOTAL = 310, 45000 + 370 + 370 + 75
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.0, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
