@@ -16,7 +16,7 @@ from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tabl
 from feti_homog.case.load_sections import MixedLoad
 from feti_homog.case.sections import DIFFERENTIABLE, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.materials import voigt
-from feti_homog.schema import keys, types, wording
+from feti_homog.schema import keys, limits, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
@@ -56,7 +56,7 @@ class Rule:
         if not all(condition.holds(selected) for condition in self.when):
             return
         content = document.get(self.path[0]) if self.path else document
-        sections = content if isinstance(content, list) else [content]
+        sections = content[: limits.SECTIONS] if isinstance(content, list) else [content]
         label = " ".join(self.path[:1])
         matches = [(f"{label} {k}" if len(sections) > 1 else label, "", each) for k, each in enumerate(sections, 1)]
         for step in self.path[1:]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from support.jobs import mpirun
 
-from hostile import case_files, fibre_tables, fuzzer, meshes, processes, results
+from hostile import case_files, events, fibre_tables, fuzzer, meshes, processes, results
 from hostile.running import in_one_job, in_processes
 
 # Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
@@ -41,7 +41,8 @@ def prepare(folder: Path) -> None:
 def tried(folder: Path, only: str) -> dict[str, list[str]]:
     """Return the faults of all attempts whose kind and name have these words."""
     prepared = folder / "prepared"
-    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts(), *results.attempts(prepared)]
+    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts()]
+    shared += [*results.attempts(prepared), *events.attempts(prepared)]
     shared, alone = (
         [a for a in some if only in f"{a.kind}: {a.name}"] for some in (shared, processes.attempts(prepared))
     )
@@ -49,7 +50,8 @@ def tried(folder: Path, only: str) -> dict[str, list[str]]:
     with ThreadPoolExecutor(1) as beside:  # the job of one rank leaves a core
         others = beside.submit(in_processes, alone, folder / "processes")
         for ranks, step in EVERY.items() if shared else ():
-            found |= in_one_job(shared[::step], ranks, folder / f"{ranks} ranks")
+            tried_here = [a for a in shared[::step] if ranks == 1 or a.kind != events.FALSE_KIND]  # of one rank
+            found |= in_one_job(tried_here, ranks, folder / f"{ranks} ranks")
         return found | others.result()
 
 
