@@ -32,7 +32,12 @@ def require_own(path: Path) -> None:
                     if isinstance(entry, h5py.Group) and len(groups) << 10 < room[True]:
                         groups.append(entry)
                         continue
-                    is_table = isinstance(entry, h5py.Dataset) and entry.shape is not None and not entry.external and entry.dtype.kind in "fiu"
+                    is_table = (
+                        isinstance(entry, h5py.Dataset)
+                        and entry.shape is not None
+                        and not entry.external
+                        and entry.dtype.kind in "fiu"
+                    )
                     if is_table:
                         room[entry.is_virtual] -= entry.nbytes
                         is_table = not entry.is_virtual or {s.file_name for s in entry.virtual_sources()} == {"."}
