@@ -1,5 +1,6 @@
 """Check links, sizes and layout of all tables in result.h5 before any table is read."""
 
+from math import inf
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -68,6 +69,13 @@ def _require_layout(path: Path, file: Any) -> None:
             expected = f"{ATTRIBUTES.get(hints[name], d.dtype)} ({counts.get(shape[1], shape[1])}{shape[2:]}"
             if shown not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
                 raise CaseError(f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name} is {shown}, expected {expected}")
+    points, refine = file["mesh/points"][()], file.attrs["refine"]
+    spans = points.max(axis=0, initial=-inf) - points.min(axis=0, initial=inf)
+    sizes = file.attrs["width"], file.attrs["height"]
+    if refine < 0 or not all(0.0 < size <= 4.0 * span for size, span in zip(sizes, spans, strict=True)):
+        raise CaseError(
+            f"cannot read {path}: a cell of {sizes[0]:g} x {sizes[1]:g}, refine = {refine}, has other nodes"
+        )
     try:
         cases.check_stored(result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

@@ -190,6 +190,16 @@ LAYOUT: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
+def attribute_with(value: Any) -> Callable[[Path], None]:
+    """Return a function that replaces the case in result.h5."""
+    return with_tables(lambda f: f.attrs.__setitem__("case", value))
+
+
+LAYOUT |= {
+    "a case of numbers": (attribute_with(np.zeros(3)), "/case is float64 (3,), expected text ()"),
+    "no case": (attribute_with("{}"), "the case in it is damaged: [cell]: missing section"),
+    "a nested case": (attribute_with("[" * 2000), "nested too deeply"),
+}
 SWEEPS: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "endless": (link_to("/dev/zero"), "it is a device, not a file"),
