@@ -6,6 +6,7 @@ from typing import Any, Self
 
 # Limits of the length and number of faults, since a file may cause any number of long faults.
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 20
+COUNT = re.compile(r"\band (\d+) more faults$")
 
 
 class ExitCode(IntEnum):
@@ -26,19 +27,20 @@ class FetiHomogError(Exception):
     """An error printed for the user, one line per fault, without a traceback.
 
     Longer lines than LONGEST_LINE keep their beginning and the last KEPT_END characters.  Faults beyond MOST_FAULTS are
-    only counted.
+    only counted, with those that caught errors have counted.
     """
 
     exit_code = ExitCode.DEFECT
 
     def __init__(self, *faults: str) -> None:
-        more = len(faults) - MOST_FAULTS
-        if more > 1:  # one more is as short as the count, or is the count
-            faults = (*faults[:MOST_FAULTS], f"and {more} more faults")
-        lines = map(escaped, faults)
+        counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
+        lines = [fault for fault in faults if fault not in counts]
+        room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # one more is as short as the count
+        more = sum(counts.values()) + max(len(lines) - room, 0)
+        lines[room:] = [f"and {more} more faults"] if more else []
         end = LONGEST_LINE - KEPT_END - 3
         # The reason stands at the end of a line.
-        self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in lines)
+        self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in map(escaped, lines))
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.feti import DualSolution
 from feti_homog.homogenization import averaging
 from feti_homog.interface import Load, Macroscopic
-from feti_homog.interface.contact import BondState, Equilibrium, coupled_interfaces
+from feti_homog.interface.contact import BONDED, BondState, Contact, Equilibrium, coupled_interfaces
 from feti_homog.interface.path import path_points
-from feti_homog.results import checkpoints, result_json
+from feti_homog.results import checkpoints, path_curves, result_json
 
 # Errors of the contact conditions; the last exists only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
@@ -20,8 +21,8 @@ KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_fricti
 LAWS = ("strain", "hill", "jump", "stress", *KKT_LAWS)
 UNCHECKED = -1.0  # the error of a law that was not checked
 EMPTY = np.zeros(0)
-# Endings of the array names of the plane and the axial problem.
-SUFFIXES = ("", "_axial")
+SUFFIXES = ("", "_axial")  # array name endings of the plane and the axial problem
+UNKNOWN = ("alpha", "broken", "certificate", "bond")  # arrays with NaN for missing numbers
 
 
 @dataclass
@@ -189,10 +190,38 @@ def resumable(context: AnalysisContext) -> int:
             say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
         return 0
     stored_events = context.checkpoint.count()
-    if (count := holding(context, stored_events)) < stored_events:
+    if (count := holding(context, consistent(context, stored_events))) < stored_events:
         say(f"  event {count} of the checkpoint is invalid: the run computes it and all later events again")
     begin = "there is no checkpoint: the path starts from the beginning"
     say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
+    return count
+
+
+def consistent(context: AnalysisContext, count: int) -> int:
+    """Count the events before the first with other arrays, bonds, loads or sums than a path has.  Collective."""
+    cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
+    waypoints = [context.loads.load(target) for target in context.case.targets]
+    waypoints, legs = [Load(0.0 * waypoints[0].values, waypoints[0].by_stress), *waypoints], len(waypoints)
+    for number in range(count):
+        event = context.checkpoint.read(number)
+        parted = context.cell.comm.allgather(_parted(context, event, layout, bonds))
+        if min(parted) < 0:
+            return number
+        point, (energies, load_controlled, _) = restored(event, cell)
+        work.arrive(point)
+        means = np.hstack([event[f"means{suffix}"] for suffix in SUFFIXES[: len(cell.problems)]])
+        leg = int(np.clip(np.ceil(point.load_factor * legs - path_curves.SAME_LOAD), 1, legs))
+        start, end = waypoints[leg - 1 : leg + 1]
+        load = start.after(point.load_factor * legs - leg + 1, end)
+        # Components whose kind changes begin where the leg before has ended.
+        change = np.where(start.by_stress == end.by_stress, np.choose(load.by_stress, means) - load.values, 0.0)
+        errors = np.abs(event["macroscopic"][2:] - means)
+        errors[load.by_stress.astype(int), np.arange(len(change))] += np.abs(change)
+        largest = context.checks.tolerance("stress") * np.abs(means).max(axis=1, keepdims=True)
+        holds = [*work.all_equilibria, work.load_controlled] == [*energies, load_controlled]
+        if not holds or sum(parted) != point.broke or (errors > largest).any():
+            return number
+        bonds = point.after.bonds
     return count
 
 
@@ -209,7 +238,7 @@ def holding(context: AnalysisContext, count: int) -> int:
         if not waiting:
             break
         first -= 1
-    for number in range(first, count):
+    for number in range(max(min(first, count - 1), 0), count):
         event, point = read(context, number)
         responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
         for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
@@ -219,6 +248,46 @@ def holding(context: AnalysisContext, count: int) -> int:
             if not change <= context.checks.tolerance("stress") * np.abs(response.stress).max():
                 return number
     return count
+
+
+def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Return types and shapes of this rank's arrays of an event.  Collective."""
+    cell, bonds = context.loads.interfaces, context.bonds(None)
+    if context.case.has_friction:
+        bonds = replace(bonds, gap_and_slip=np.zeros((len(bonds.status), 2)), sliding=bonds.status)
+    shapes: dict[str, Any] = {"path": 6, "energies": 2 * len(path_points.NO_ENERGIES) + 1, "bond": 2}
+    shapes |= {"macroscopic": (4, len(cell.loads)), "broken": (), "stretched": ()}
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays |= {"point": np.array("")} | _bond_arrays(bonds, "_after")
+    for suffix, interface, lam in zip(SUFFIXES, cell.problems, cell.no_multipliers(), strict=False):
+        v = len(interface.solver.problem.loads)
+        shapes = {"load": (2, v), "strain": v, "alpha": interface.solver.natural.kernel_dimension, "residual": ()}
+        shapes |= {"asked": v, "certificate": len(KKT_LAWS), "means": (2, v), "energies_of": 2, "errors": len(LAWS)}
+        of_problem = {name: np.zeros(shape) for name, shape in shapes.items()} | {"lam": lam, "jump": lam}
+        of_problem |= {"numbers": np.zeros(5, np.int64), "confirmed": np.array(True)}
+        arrays |= {f"{name}{suffix}": array for name, array in of_problem.items()} | _bond_arrays(bonds, suffix)
+    return {name: (array.dtype.char, array.shape) for name, array in arrays.items()}
+
+
+def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
+    """Count this rank's bonds that part; -1 for other arrays, numbers that are none, or bonds that heal."""
+    kept = {name: of for name, of in layout.items() if "lam" in event or not checkpoints.FOUND_AGAIN.fullmatch(name)}
+    if {name: (array.dtype.char, array.shape) for name, array in event.items()} != kept:
+        return -1
+    states = [before, *(_bond_state(event, suffix) for suffix in (*SUFFIXES[: len(context.loads.problems)], "_after"))]
+    holds = min(event["path"][4:].min(), event["numbers"].min()) >= 0 and np.isnan(event["bond"]).sum() != 1
+    for name, array in event.items():
+        if array.dtype.char == "d":
+            holds &= bool(np.isfinite(array[~np.isnan(array)] if name.startswith(UNKNOWN) else array).all())
+    for earlier, later in pairwise(states):
+        heals = (later.history < earlier.history).any(axis=1) | (later.status == BONDED) & (earlier.status != BONDED)
+        is_known = np.isin(later.status, [*Contact]) & np.isin(later.sliding_signs, [-1, 0, 1])
+        holds &= bool((is_known & ~heals).all())
+    try:
+        context.plane.damage(states[-1])
+    except IndexError:  # of a tooth beyond the last
+        return -1
+    return int((states[-1].status != BONDED).sum() - (before.status != BONDED).sum()) if holds else -1
 
 
 def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:

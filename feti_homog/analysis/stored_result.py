@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 from feti_homog.analysis.result import Result
 from feti_homog.case import Case, cases, sections, toml_files
 from feti_homog.errors import CaseError
+from feti_homog.materials import voigt
 from feti_homog.results import checkpoints, field_file, field_guard, output_folder, result_json
 from feti_homog.schema import keys, wording
 
@@ -19,10 +20,14 @@ def read(directory: Path) -> dict[str, Any]:
         CaseError: a file is missing, damaged, or from another program or run.
     """
     document = output_folder.latest(directory)
-    if "unfinished" not in document:
-        result = _restored(directory, document)
-        if result.case["output"].get("fields", True):
-            _check_fields(directory, result)
+    result = _restored(directory, document)
+    if "unfinished" in document:
+        size = len(voigt.plane_state_of(document).components)
+        points = result.path or ()
+        if not all(0.0 < p.load_factor <= 1.0 and len(p.strain) == len(p.stress) == size for p in points):
+            raise CaseError(f"{directory / checkpoints.FOLDER}: it is damaged: its points are not of its case")
+    elif result.case["output"].get("fields", True):
+        _check_fields(directory, result)
     return document
 
 
@@ -90,6 +95,8 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
     try:
+        if "unfinished" in document:  # whose checks and faults follow at the end
+            document = {**document, "faults": (), "checks": {"strain": 0.0, "hill": 0.0, **document["checks"]}}
         result = Result.of(document)
         cases.check_stored(result.case)
         if "output" not in result.case:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from feti_homog.case.interface_section import Arc, InterfaceSection, interface_t
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import provider, read_materials
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
-from feti_homog.case.rules import RULES
+from feti_homog.case.rules import RULES, Rule
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.toml_files import leaves, read_document, short_digest, to_document, with_values
 from feti_homog.errors import CaseError
@@ -245,7 +246,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     if complaint := types.text.complaint(name := document.get("name", "case")):
         faults.append(f"name = {wording.toml_value(name)}: {complaint}")
     reader = TableReader(selected, sections.KEY_OWNERS, faults)
-    rules = [rule for rule in RULES if not rule.path or rule.path[0] in document]  # for the 10 000 cases of a sweep
+    rules = _applicable(frozenset(document.keys() & sections.SECTIONS.keys()), tuple(selected.items()))
     of_rules = [[*rule.faults(document, selected)] for rule in rules]
     foreign = {rule.path[0] for rule, lines in zip(rules, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
@@ -263,6 +264,13 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     # Sections that do not belong to the analysis have no further checks.
     faults += relation_faults(contents | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return contents, faults
+
+
+@lru_cache
+def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str | None], ...]) -> list[Rule]:
+    """Return the rules for these sections whose conditions hold; the same for all cases of a sweep."""
+    rules = (rule for rule in RULES if not rule.path or rule.path[0] in names)
+    return [rule for rule in rules if all(condition.holds(dict(selected)) for condition in rule.when)]
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:

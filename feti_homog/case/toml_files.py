@@ -70,8 +70,8 @@ def to_document(values: object) -> dict[str, Any]:
 
 
 def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> Any:
-    if isinstance(value, str | float | bool) and not isinstance(value, np.generic):
-        return value  # first, for most are
+    if type(value) in (float, str, bool) or (type(value) is int and value.bit_length() <= MAX_BITS):
+        return value  # most values; other types, such as those of NumPy, follow
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, Mapping | list | tuple):

@@ -141,14 +141,16 @@ class Checkpoint(EventsInMemory):
             raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
-        size = self.comm.size
-        event = mpi_errors.on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))
-        parts = []
-        if event is not None:  # on rank 0, which cuts the distributed arrays
+        def cut() -> list[Arrays]:
+            event, size = unpacked(next(records(self.path, self._ends[number]))[1]), self.comm.size
             ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
-            whole = [np.split(event[n], at[:-1]) if at is not None else [event[n]] * size for n, at in ends.items()]
-            parts = [dict(zip(ends, arrays, strict=True)) for arrays in zip(*whole, strict=True)]
-        part: Arrays = self.comm.scatter(parts)
+            try:
+                whole = [np.split(event[n], at[:-1]) if at is not None else [event[n]] * size for n, at in ends.items()]
+                return [{name: whole[n][rank] for n, name in enumerate(ends)} for rank in range(size)]
+            except (IndexError, TypeError, ValueError) as error:
+                raise CaseError(f"{self.path} is damaged: its arrays are not of {size} ranks") from error
+
+        part: Arrays = self.comm.scatter(mpi_errors.on_root_only(self.comm, cut) or [])
         return part
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
@@ -237,7 +239,7 @@ def unpacked(content: bytes) -> Arrays:
         data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 64 * len(content)))
         event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
         for name, kind, shape in json.loads(data[:start]):
-            event[name] = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape).copy()
+            event[str(name)] = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape).copy()
             start += event[name].nbytes
     except (ArithmeticError, RecursionError, SyntaxError, TypeError, ValueError, zlib.error) as error:
         raise CaseError(f"an event of the checkpoint is damaged: {error}") from error

@@ -24,10 +24,10 @@ class Header:
     height: float = described("height of the cell", records.LENGTH)
     order: int = described("order of the elements: 1, or 2 with curved sides at interfaces")
     refine: int = described("times that every triangle of the coarse mesh was cut in four")
-    phases: tuple[str, ...] = described("names of the phases")
+    phases: tuple[str, ...] = described("names of the phases", shape="(p,)")
     length_unit: str = described("label of the unit of lengths, may be empty", default="")
     stress_unit: str = described("label of the unit of stresses, may be empty", default="")
-    origin: tuple[float, float] = described("lower left corner of the cell", records.LENGTH, default=(0.0, 0.0))
+    origin: tuple[float, float] = described("lower left corner of the cell", records.LENGTH, "(2,)", default=(0.0, 0.0))
     case: str = described("the case with its defaults as JSON, the same as `case` of result.json", default="{}")
 
 

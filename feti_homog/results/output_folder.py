@@ -135,7 +135,8 @@ def latest(directory: Path) -> dict[str, Any]:
         points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
         opening["solver"]["iterations"] = [point["iterations"] for point in points]
         place = f"unfinished, {len(points)} points up to load {max(point['load_factor'] for point in points):.4f}"
-    except (LookupError, TypeError, ValueError) as error:
+        result_json.text_of({"path": points})  # refuses numbers that are not finite
+    except (FetiHomogError, LookupError, TypeError, ValueError) as error:
         raise CaseError(f"{path} is damaged: {error}") from error
     return opening | {"path": points, "status": place, "unfinished": place}
 

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -117,6 +118,7 @@ def key(
     return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 
 
+@cache
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
     """Return the keys of a table class by name, without derived fields."""
     return {entry.name: entry.metadata["key"] for entry in dataclasses.fields(table_class) if "key" in entry.metadata}
@@ -145,12 +147,9 @@ class TableReader:
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
             return None
         keys, before = keys_of(table_class), len(self.faults)
-        faults = {
-            name: f" = {toml_value(table[name])}: unknown key; "
-            + (suggestion(name, keys, self.owners) if before < MOST_FAULTS else "")  # slow, and not to be seen
-            for name in table
-            if name not in keys
-        }
+        faults = dict.fromkeys((name for name in table if name not in keys), "")
+        for name in [*faults][: max(MOST_FAULTS + 1 - before, 0)]:  # others are only counted
+            faults[name] = f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
         faults |= {name: words for name, entry in keys.items() if (words := entry.fault(name, table))}
         self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faults.items()]
         good = {name: value for name, value in table.items() if name not in faults}

@@ -9,7 +9,7 @@ DIR/case-0001/error.txt       the reason of a failure
 import contextlib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -91,6 +91,25 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
             raise output_folder.foreign(directory, path.name, kind)
 
 
+@contextlib.contextmanager
+def document_lock(directory: Path) -> Iterator[None]:
+    """Exclude other studies while one checks the folder and writes its document.  On one rank.
+
+    Raises CaseError if another process holds the lock for long; file systems may have no locks.
+    """
+    lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
+    try:
+        try:
+            lock.acquire()
+        except file_locks.LocksUnsupported:
+            lock.path.unlink(missing_ok=True)
+        yield
+    except file_locks.LockHeld as error:
+        raise CaseError(f"--out {directory}: {error} has been writing the document of a study for long") from error
+    finally:
+        lock.release()
+
+
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the sweep folder, or extend its case list.  On one rank.
 
@@ -104,34 +123,31 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
     if _stored_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
         return
-    try:
-        with file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
-            stored = _stored_entries(directory)
-            reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
-            for old, new in zip(stored, sweep.entries, strict=False):
-                if old != new:
-                    reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-                    if old.inputs == new.inputs:
-                        in_words = "keys that do not vary, or in the content of a mesh"
-                        reason = f"its {old.folder} differs from this file in {in_words}"
-                    break
-            if stored != sweep.entries[: len(stored)]:
-                raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
-            if not stored:
-                refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
-            atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
-            if stored != sweep.entries:
-                document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
-                entries = [_replaced(asdict(entry), math.inf, types.INF) for entry in sweep.entries]
-                atomic.replace_text(directory / INDEX_FILE, result_json.dumps(document | {"cases": entries}))
-            inputs = list(dict.fromkeys(name for entry in sweep.entries for name in entry.inputs))
-            table: list[list[Any]] = [["case", "folder", "point", "realisation", *inputs]]
-            for entry in sweep.entries:
-                values = [entry.inputs.get(name, "") for name in inputs]
-                table.append([entry.number, entry.folder, entry.point, entry.realisation, *values])
-            atomic.replace_text(directory / TABLE_FILE, result_json.csv_text(table))
-    except file_locks.LockHeld as error:
-        raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
+    with document_lock(directory):
+        stored = _stored_entries(directory)
+        reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
+        for old, new in zip(stored, sweep.entries, strict=False):
+            if old != new:
+                reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+                if old.inputs == new.inputs:
+                    in_words = "keys that do not vary, or in the content of a mesh"
+                    reason = f"its {old.folder} differs from this file in {in_words}"
+                break
+        if stored != sweep.entries[: len(stored)]:
+            raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
+        if not stored:
+            refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
+        atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
+        if stored != sweep.entries:
+            document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
+            entries = [_replaced(asdict(entry), math.inf, types.INF) for entry in sweep.entries]
+            atomic.replace_text(directory / INDEX_FILE, result_json.dumps(document | {"cases": entries}))
+        inputs = list(dict.fromkeys(name for entry in sweep.entries for name in entry.inputs))
+        table: list[list[Any]] = [["case", "folder", "point", "realisation", *inputs]]
+        for entry in sweep.entries:
+            values = [entry.inputs.get(name, "") for name in inputs]
+            table.append([entry.number, entry.folder, entry.point, entry.realisation, *values])
+        atomic.replace_text(directory / TABLE_FILE, result_json.csv_text(table))
 
 
 def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:

@@ -127,19 +127,20 @@ class Study(ABC):
         path = directory / self.FILE
 
         def begin() -> None:  # the document has the digest from the start
-            if is_new := not path.exists():
-                with atomic.write_errors(directory):
-                    case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
-            else:
-                try:
-                    stored = result_json.loads(input_files.read(path).decode("utf-8"))
-                except (OSError, ValueError) as error:
-                    raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
-                if stored.get("digest") != head["digest"]:
-                    raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
-            atomic.remove_unfinished(directory, self.ENTRIES)
-            if is_new:
-                atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
+            with case_folders.document_lock(directory):
+                if is_new := not path.exists():
+                    with atomic.write_errors(directory):
+                        case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
+                else:
+                    try:
+                        stored = result_json.loads(input_files.read(path).decode("utf-8"))
+                    except (OSError, ValueError) as error:
+                        raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
+                    if stored.get("digest") != head["digest"]:
+                        raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
+                atomic.remove_unfinished(directory, self.ENTRIES)
+                if is_new:
+                    atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
 
         with output_folder.held(
             directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None

@@ -10,6 +10,8 @@ from support.jobs import ROOT
 from support.standing_jobs import standing_job
 
 COMMIT = "feti_homog.results.atomic:commit"
+# Before the lock under which a study checks its folder and writes its document.
+CLAIM = Hook("feti_homog.system.runtime.file_locks:Lock._take", WAIT, when="args[0].path.name == 'index.lock'")
 FIT = """
 [cell]
 geometry = "square"
@@ -55,6 +57,31 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     found = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
     assert results.items() <= found.items() and len(found) == document["evaluations"]
     assert document["status"] == "done" and not (out / "result.lock").exists()
+
+
+@pytest.mark.parametrize(("kind", "first"), [("fit", "sweep"), ("fit", "fit"), ("uncertainty", "sweep")])
+def test_of_two_studies_that_begin_in_one_folder_one_goes_on(tmp_path, kind, first):
+    """Stop a sweep and another study, both past the checks of the folder, before `first` writes its document."""
+    cell, out = FIT.partition("[unknown]")[0], tmp_path / "out"
+    sweep = cell + '[sweep]\n"cell.fibre_fraction" = [0.3]\n'
+    scatter = cell.replace("0.4", "{mean = 0.4, std = 0.02}")
+    for name, text in {"fit": FIT, "sweep": sweep, "uncertainty": scatter}.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    words = {name: (name, tmp_path / f"{name}.toml", "--out", out, "--quiet") for name in ("sweep", kind)}
+    (second,), document = words.keys() - {first}, f"{first}.json"
+    stops = {first: Hook(COMMIT, WAIT, when=f"args[1].name == '{document}'"), second: CLAIM}
+    with HookedJob(0, [stops["sweep"]], *words["sweep"]) as of_sweep:
+        assert of_sweep.reported() == "0 here"
+        with HookedJob(0, [stops[kind]], *words[kind]) as other:
+            assert other.reported() == "0 here"
+            jobs = {"sweep": of_sweep, kind: other}
+            for job in (jobs[second], jobs[first]):
+                job.release()
+            assert jobs[first].ended().returncode == 0
+            end = jobs[second].ended()
+    assert end.returncode == 2 and len(end.stderr.splitlines()) == 1, end.stderr
+    assert f"holds another study, whose file is {document}" in end.stderr
+    assert not list(out.glob("*.lock")) and {path.name for path in out.glob("*.json")} == {document}
 
 
 def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):

@@ -12,12 +12,13 @@ from pathlib import Path
 
 from support.jobs import mpirun
 
-from hostile import case_files, fibre_tables, fuzzer, meshes, processes, results
+from hostile import case_files, events, fibre_tables, fuzzer, meshes, processes, results
 from hostile.running import in_one_job, in_processes
 
 # Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
 EVERY = {1: 1, 2: 5, 3: 11}
 CASES, SEED = 200, 1
+AT_ONCE = 2  # jobs, or processes: as many as the cores of a small machine
 
 
 def parser() -> argparse.ArgumentParser:
@@ -32,25 +33,34 @@ def parser() -> argparse.ArgumentParser:
 def prepare(folder: Path) -> None:
     """Make the folders that attempts damage."""
     folder.mkdir()
-    for name, (command, case) in results.PREPARED.items():
+
+    def run(name: str) -> None:
+        command, case = results.PREPARED[name]
         (folder / f"{name}.toml").write_text(case)
         job = mpirun(0, "-m", "feti_homog", command, folder / f"{name}.toml", "--out", folder / name)
         assert job.returncode == (3 if name == "unfinished" else 0), job.stderr
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        list(pool.map(run, results.PREPARED))
 
 
 def tried(folder: Path, only: str) -> dict[str, list[str]]:
     """Return the faults of all attempts whose kind and name have these words."""
     prepared = folder / "prepared"
-    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts(), *results.attempts(prepared)]
+    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts()]
+    shared += [*results.attempts(prepared), *events.attempts(prepared)]
     shared, alone = (
         [a for a in some if only in f"{a.kind}: {a.name}"] for some in (shared, processes.attempts(prepared))
     )
-    found: dict[str, list[str]] = {}
-    with ThreadPoolExecutor(1) as beside:  # the job of one rank leaves a core
-        others = beside.submit(in_processes, alone, folder / "processes")
-        for ranks, step in EVERY.items() if shared else ():
-            found |= in_one_job(shared[::step], ranks, folder / f"{ranks} ranks")
-        return found | others.result()
+    jobs = []
+    for ranks, step in EVERY.items():
+        tried_here = [a for a in shared[::step] if ranks == 1 or a.kind != events.FALSE_KIND]  # of one rank
+        parts = (tried_here[k::AT_ONCE] for k in range(AT_ONCE)) if ranks == 1 else (tried_here,)
+        jobs += [(part, ranks, folder / f"{ranks} ranks, {k}") for k, part in enumerate(parts) if part]
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        in_jobs = [pool.submit(in_one_job, *job) for job in jobs]
+        found = in_processes(alone, folder / "processes", pool)
+        return {name: faults for job in in_jobs for name, faults in job.result().items()} | found
 
 
 def main() -> int:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from support.base_case import changed
 from support.small_path import PATH
 
-from feti_homog.results import checkpoints, result_json
+from feti_homog.results import result_json
 from hostile.attempts import Attempt, Content, copy_of
 
 SMALL = changed(
@@ -191,24 +190,15 @@ LAYOUT: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
-def in_events(change: Callable[[list[checkpoints.Arrays]], Any]) -> Callable[[Path], None]:
-    """Return a function that changes the events of a checkpoint, or returns others, and renews their checksums."""
-
-    def make(path: Path) -> None:
-        signature, *contents = [content for _, content in checkpoints.records(path)]
-        events = [checkpoints.unpacked(content) for content in contents]
-        events = change(events) or events
-        contents = [event if isinstance(event, bytes) else checkpoints.packed(event) for event in events]
-        path.write_bytes(checkpoints.begin(signature.decode()) + b"".join(map(checkpoints.record, contents)))
-
-    return make
+def attribute_with(value: Any) -> Callable[[Path], None]:
+    """Return a function that replaces the case in result.h5."""
+    return with_tables(lambda f: f.attrs.__setitem__("case", value))
 
 
-EVENTS: dict[str, Callable[[Path], None]] = {
-    "a gigabyte of zeros": in_events(lambda events: [*events, zlib.compress(bytes(1 << 30), 1)]),
-    "zeros": in_events(lambda events: [*events, zlib.compress(bytes(1000))]),
-    "no compression": in_events(lambda events: [*events, b"[]"]),
-    "an array of objects": in_events(lambda events: [*events, zlib.compress(b'[["a", "O", [1]]]\n12345678')]),
+LAYOUT |= {
+    "a case of numbers": (attribute_with(np.zeros(3)), "/case is float64 (3,), expected text ()"),
+    "no case": (attribute_with("{}"), "the case in it is damaged: [cell]: missing section"),
+    "a nested case": (attribute_with("[" * 2000), "nested too deeply"),
 }
 SWEEPS: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
@@ -231,26 +221,19 @@ OUTS: dict[str, tuple[str, Mapping[str, Content], str]] = {
 }
 
 
-def of_layout_and_events(prepared: Path) -> Iterator[Attempt]:
-    """Yield attempts on tables and events of right checksums."""
+def of_layout(prepared: Path) -> Iterator[Attempt]:
+    """Yield attempts on tables of right checksums."""
     for name, (make, expected) in LAYOUT.items():
         for command in ("plot", "verify", "fields"):
             files = {"out": copy_of(prepared / "path", result_h5=make)}
             yield Attempt("layout of fields", f"{name}, {command}", (command, "@/out"), expected, files, (2,))
-    resume, plot = ("run", "@/c.toml", "--out", "@/out", "--resume"), COMMANDS["plot"]
-    # On other ranks, resume names the ranks first.
-    for command, words, expected in (("resume", resume, "/out"), ("plot", plot, "checkpoint")):
-        for name, make in EVENTS.items():
-            changes = {"checkpoint/events": make, "result_json": os.unlink}
-            files = {"c.toml": PREPARED["unfinished"][1], "out": copy_of(prepared / "unfinished", **changes)}
-            yield Attempt("checkpoints", f"{name}, {command}", words, expected, files, (2,))
 
 
 def attempts(prepared: Path) -> Iterator[Attempt]:
     """Yield those that damage copies of the `PREPARED` folders."""
     for name, (content, expected) in JSON.items():
         for command in READERS if name in ("a pipe", "endless", "a link in a circle") or "nested" in name else COMMANDS:
-            if command == "collect":
+            if command == "collect" or (command == "plot" and name == HARMLESS[1]):  # no picture has it
                 continue
             files = {"out": copy_of(prepared / "path", result_json=content)}
             codes = (0, 2, 3) if name in HARMLESS else (2, 3) if command == "verify" else (2,)
@@ -263,7 +246,7 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
         for command in ("plot", "report", "verify", "fields"):
             files = {"pipe": os.mkfifo, "out": copy_of(prepared / "path", result_h5=make)}
             yield Attempt("tables of fields", f"{name}, {command}", (command, "@/out"), NO_RESULT, files, (2,))
-    yield from of_layout_and_events(prepared)
+    yield from of_layout(prepared)
     files = {"out": copy_of(prepared / "path", path_csv=link_to("/dev/zero"))}
     yield Attempt("tables of points", "endless, which is none", COMMANDS["verify"], "", files, (0,))
     for name, (content, expected) in SWEEPS.items():

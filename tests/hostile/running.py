@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,7 +14,6 @@ from support.jobs import ROOT, environment, mpirun
 
 from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, entries
 
-AT_ONCE = 3  # processes
 MOST_TOLD = 1500  # characters of what a faulty attempt printed
 
 
@@ -45,8 +44,8 @@ def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[st
     return found
 
 
-def in_processes(attempts: Sequence[Attempt], folder: Path) -> dict[str, list[str]]:
-    """Return the faults of attempts in processes of their own, a few at a time."""
+def in_processes(attempts: Sequence[Attempt], folder: Path, pool: Executor) -> dict[str, list[str]]:
+    """Return the faults of attempts in processes of their own, which the threads of a pool start."""
     for name in ("bin", "home"):
         (folder / name).mkdir(parents=True)
         (folder / name).chmod(0o777)
@@ -55,9 +54,8 @@ def in_processes(attempts: Sequence[Attempt], folder: Path) -> dict[str, list[st
     program = folder / "bin/feti"
     program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m feti_homog "$@"\n')
     program.chmod(0o755)
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = pool.map(lambda pair: _in_process(pair[1], folder / str(pair[0])), enumerate(attempts))
-        return {f"{a.kind}: {a.name}": faults for a, faults in zip(attempts, found, strict=True)}
+    found = pool.map(lambda pair: _in_process(pair[1], folder / str(pair[0])), enumerate(attempts))
+    return {f"{a.kind}: {a.name}": faults for a, faults in zip(attempts, found, strict=True)}
 
 
 def _in_process(attempt: Attempt, place: Path) -> list[str]:

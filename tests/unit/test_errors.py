@@ -19,3 +19,13 @@ def test_many_faults_are_counted_once():
     again = pickle.loads(pickle.dumps(error))
     assert again.faults == error.faults == CaseError(*error.faults).faults and str(again) == "\n".join(error.faults)
     assert len(CaseError(*map(str, range(MOST_FAULTS + 1))).faults) == MOST_FAULTS + 1
+
+
+def test_faults_of_caught_errors_are_counted_with_the_others():
+    inner = CaseError(*map(str, range(100)))
+    placed = CaseError(*(f"[unknown] young: {fault}" for fault in inner.faults), "last")
+    assert placed.faults[-2:] == ("[unknown] young: 19", "and 81 more faults")
+    cases = CaseError(*(f"case-{k}: {fault}" for k in range(3) for fault in inner.faults))
+    assert len(cases.faults) == MOST_FAULTS + 1 and cases.faults[-1] == "and 280 more faults"
+    few = CaseError("first", *(f"[cell] {fault}" for fault in inner.faults[18:]))
+    assert few.faults == ("first", "[cell] 18", "[cell] 19", "and 80 more faults")

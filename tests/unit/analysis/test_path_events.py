@@ -14,14 +14,16 @@ YES, NO = True, False
 @pytest.mark.parametrize(
     ("plane", "axial", "unconfirmed"),
     [
-        ([YES, YES, YES], [YES, YES, YES], []),
+        ([YES, YES, YES], [YES, YES, YES], [2]),
         ([YES, NO, YES, NO], [YES, YES, NO, NO], [2, 3]),
         ([YES, NO, NO], None, [1, 2]),
         ([NO, NO], [NO, YES], [0, 1]),
     ],
     ids=["all", "in turn", "plane alone", "never"],
 )
-def test_events_after_the_last_that_holds_in_all_problems_are_checked(monkeypatch, plane, axial, unconfirmed):
+def test_the_last_event_and_those_after_the_last_that_holds_in_all_problems_are_checked(
+    monkeypatch, plane, axial, unconfirmed
+):
     columns = {"confirmed": plane} if axial is None else {"confirmed": plane, "confirmed_axial": axial}
     events = [
         {"number": number} | {name: column[number] for name, column in columns.items()} for number in range(len(plane))

@@ -20,6 +20,23 @@ TABLES = {
 }
 
 
+ATTRIBUTES = {
+    ("/", "case"): (
+        (np.zeros(3), r"/case is float64 \(3,\), expected text \(\)"),
+        ("[]", "no table of keys"),
+        ("{}", r"the case in it is damaged: \[cell\]: missing"),
+        ("[" * 2000, "nested too deeply"),
+    ),
+    ("/", "title"): ((np.bytes_(b"x"), r"/title is \|S1 \(\), expected text \(\)"),),
+    ("/", "phases"): (("matrix", r"/phases is text \(\), expected text \("),),
+    ("/", "width"): ((h5py.Empty("f8"), "/width is float64 None"), (np.nan, "a cell of nan x"), (1e300, "other nodes")),
+    ("/", "refine"): ((1.0, r"/refine is float64 \(\), expected int64 \(\)"), (-1, "refine = -1, has other nodes")),
+    ("/", "origin"): ((np.zeros(3), r"/origin is float64 \(3,\), expected float64 \(2,\)"), (None, "cannot read")),
+    ("state/0", "strain"): (("E11", r"/state/0/strain is text \(\), expected float64 \(3,\)"),),
+    ("state/0", "label"): ((1, r"/state/0/label is int64 \(\), expected text \(\)"),),
+}
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Provide the folder of a small stiffness with fields."""
@@ -38,6 +55,18 @@ def test_other_shapes_and_types_are_refused(folder, tmp_path, name):
         file[name] = table
     with pytest.raises(CaseError, match=line):
         read_state(tmp_path)
+
+
+@pytest.mark.parametrize(("group", "name"), ATTRIBUTES)
+def test_attributes_of_other_shapes_and_types_are_refused(folder, tmp_path, group, name):
+    for value, line in ATTRIBUTES[group, name]:
+        with h5py.File(shutil.copy(folder / "result.h5", tmp_path), "r+") as file:
+            del file[group].attrs[name]
+            if value is not None:
+                file[group].attrs[name] = value
+        with pytest.raises(CaseError, match=line) as error:
+            read_state(tmp_path)
+        assert len(error.value.faults) == 1
 
 
 def test_deeply_nested_documents_are_refused(tmp_path):
