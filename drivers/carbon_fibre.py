@@ -1,10 +1,10 @@
-"""Transverse and shear moduli of a carbon fibre from plies, which no test of the fibre itself gives.
+"""Fit the transverse and shear moduli of a carbon fibre, which no fibre test gives, to ply constants.
 
     mpirun -n 2 .venv/bin/python drivers/carbon_fibre.py --out results/carbon_fibre
 
-Plies of AS4/3501-6 at three fibre fractions: the constants at 0.6 are those of the exact solution of the hexagonal
-arrangement, the others those of finer cells.  The epoxy and the fibre's constants along its axis are given; the fit
-returns E_transverse, nu_transverse and G_axial with their intervals, beside those from which the plies were made.
+Plies of AS4/3501-6 at three fibre fractions: the constants at 0.6 come from the exact solution of the hexagonal
+arrangement, the others from finer cells.  The constants of the epoxy and of the fibre along its axis are given; the fit
+returns E_transverse, nu_transverse and G_axial with their intervals, beside the true constants of the plies.
 """
 
 import argparse
@@ -29,7 +29,7 @@ EXACT = {0.6: (9.1812952, 3.3297852, 5.8190872)}  # by multipole series
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Make the plies, fit, and print the estimates beside the truth."""
+    """Make the plies, fit, and print the estimates beside the true constants."""
     plies = {fraction: EXACT.get(fraction) or ply(given, comm, fraction) for fraction in FRACTIONS}
     fitted = document(given, ALONG) | {
         "name": "carbon fibre",

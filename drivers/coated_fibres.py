@@ -1,10 +1,10 @@
-"""Coated fibres: stiffness over that of the interphase, and which of its two interfaces debonds first.
+"""Coated fibres: moduli over the coating's stiffness, and the first of two interfaces to debond.
 
     mpirun -n 2 .venv/bin/python drivers/coated_fibres.py --out results/coated_fibres
 
-Glass in epoxy, hexagonal cell in plane strain.  The plane bulk modulus stands beside that of composite cylinders
-(Z. Hashin, B. W. Rosen, J. Appl. Mech. 31, 1964, 223), a cylinder of fibre and coating in one of matrix; the stresses
-S11 alone at which the fibre comes off its coating, and the coating off the matrix, are those of equal bonds.
+Glass in epoxy, hexagonal cell in plane strain.  The table compares the plane bulk modulus with composite cylinders (Z.
+Hashin, B. W. Rosen, J. Appl. Mech. 31, 1964, 223): a cylinder of fibre and coating inside a matrix cylinder. It also
+lists the stress S11, applied alone, at which each interface debonds; both interfaces have equal bonds.
 """
 
 import argparse
@@ -27,17 +27,17 @@ PAIRS = (("fibre", "coating"), ("coating", "matrix"))
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """All coatings; print, write and draw."""
+    """Solve all coatings; print, write and draw."""
     ratios = np.geomspace(0.03, 30.0, 3 if given.quick else 13)
     rows = [[ratio, *point(given, comm, float(ratio))] for ratio in ratios]
     figures.finish(comm, write, given.out, given.coating, rows)
 
 
 def point(given: argparse.Namespace, comm: Intracomm, ratio: float) -> list[float]:
-    """Constants of one coating, `ratio` times as stiff as the matrix.
+    """Return the constants of one coating, `ratio` times as stiff as the matrix.
 
-    They are the bulk modulus, that of composite cylinders, the shear modulus, and S11 at the onset of debonding within
-    and around the coating.
+    They are the bulk modulus, the bulk modulus of composite cylinders, the shear modulus, and S11 at the onset of
+    debonding within and around the coating.
     """
     coating = {"young": ratio * MATRIX["young"], "poisson": COATING_POISSON}
     bonded = solved(given, comm, coating, "stiffness", "bonded")
@@ -61,7 +61,7 @@ def point(given: argparse.Namespace, comm: Intracomm, ratio: float) -> list[floa
 def solved(
     given: argparse.Namespace, comm: Intracomm, coating: dict[str, float], analysis: str, name: str, **sections: Any
 ) -> Result:
-    """One analysis of the cell with that coating, in a folder of that name."""
+    """Return the result of one analysis of the cell with a coating, in a folder `name`."""
     document = {
         "name": f"{name} {coating['young']:g}",
         "cell": {
@@ -77,26 +77,26 @@ def solved(
 
 
 def composite_cylinders(coating: dict[str, float], thickness: float) -> float:
-    """Plane bulk modulus of cylinders of fibre, coating and matrix within each other."""
+    """Return the plane bulk modulus of nested cylinders of fibre, coating and matrix."""
     outer = FRACTION * (1 + thickness) ** 2
     coated = cylinder(coating, moduli(FIBRE)[0], FRACTION / outer)
     return cylinder(MATRIX, coated, outer)
 
 
 def cylinder(around: dict[str, float], core: float, share: float) -> float:
-    """Plane bulk modulus of a cylinder with a core of that modulus and share: k + c / [1/(K - k) + (1 - c)/(k + G)]."""
+    """Return k + c / [1/(K - k) + (1 - c)/(k + G)], the plane bulk modulus of a cylinder with a core K of share c."""
     bulk, shear = moduli(around)
     return bulk + share / (1 / (core - bulk) + (1 - share) / (bulk + shear))
 
 
 def moduli(phase: dict[str, float]) -> tuple[float, float]:
-    """Plane bulk modulus lambda + G, and G."""
+    """Return the plane bulk modulus lambda + G, and G."""
     shear = phase["young"] / (2 * (1 + phase["poisson"]))
     return shear / (1 - 2 * phase["poisson"]), shear
 
 
 def write(folder: Path, thickness: float, rows: list[list[float]]) -> list[Path]:
-    """coated_fibres.csv and coated_fibres.png."""
+    """Write coated_fibres.csv and coated_fibres.png."""
     from matplotlib.figure import Figure
 
     head = ("E coating / E matrix", "K", "K cylinders", "G", "S11 fibre | coating", "S11 coating | matrix")

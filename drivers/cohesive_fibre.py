@@ -2,12 +2,12 @@
 
     mpirun -n 2 .venv/bin/python drivers/cohesive_fibre.py --out results/cohesive_fibre
 
-A square cell with one glass fibre of 7.5 um in epoxy, 40 %, plane strain, E11 alone.  The cohesive law is bilinear:
-1e4 MPa/um, strengths of 60 and 84.85 MPa in opening and shear, toughnesses of 2 and 4 J/m2, so that its energy does not
-depend on the path.  Glued bonds have these strengths alone; bonds that break by released energy have springs so soft,
-900 MPa/um, that they have the same strengths and toughnesses.  The stress at the first event, the peak up to twice
-its strain, and the semi-angle of each debond at the end; for the bilinear law also with other strengths, toughnesses,
-elements and teeth.  `--table` compares it with a prototype of its own, on meshes of its own.
+A square cell with one glass fibre of 7.5 um in epoxy, 40 %, plane strain, E11 alone.  The cohesive law is bilinear: 1e4
+MPa/um, strengths of 60 and 84.85 MPa in opening and shear, toughnesses of 2 and 4 J/m2, so that the dissipated energy
+does not depend on the path.  Brittle bonds have these strengths only.  Bonds that break by released energy need springs
+as soft as 900 MPa/um for the same strengths and toughnesses.  Rows give the stress at the first event, the peak up to
+twice the strain there, and the semi-angle of each debond at the end.  For the bilinear law strengths, toughnesses,
+elements and teeth vary.  `--table` compares with an independent prototype.
 """
 
 import argparse
@@ -43,7 +43,7 @@ COLUMNS = ("law", "strength", "toughness", "element um", "teeth", "onset S11", "
 
 
 class Interface(NamedTuple):
-    """A law with strengths and toughnesses so many times those above, on a mesh, in teeth."""
+    """A law with multiples of the strengths and toughnesses above, on a mesh, in teeth."""
 
     law: str
     refine: int
@@ -69,7 +69,7 @@ class Interface(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The name of its folder."""
+        """The name of the result folder."""
         numbers = f"{self.law}_{self.refine}_{self.teeth}"
         return numbers + f"_{self.strength:g}_{self.toughness:g}".replace("_1_1", "")
 
@@ -126,13 +126,13 @@ def numbers(result: Result) -> list[float]:
 
 
 def element(result: Result) -> float:
-    """Length of the elements on the interface, um."""
+    """Return the length of the elements on the interface, um."""
     first = (result.path or ())[0]
     return 2 * np.pi * RADIUS / (first.bonded + first.open + first.closed)
 
 
 def write(folder: Path, found: dict[Interface, Result], own: Interface) -> list[Path]:
-    """cohesive_fibre.csv and cohesive_fibre.png."""
+    """Write cohesive_fibre.csv and cohesive_fibre.png."""
     header = "law       strength  toughness  element um  teeth  onset MPa   peak   angle"
     print(header + "".join(f"{x:>8g}" for x in AT))
     rows = []
@@ -169,7 +169,7 @@ def curves(found: dict[Interface, Result], own: Interface) -> dict[str, dict[str
 
 
 def draw(path: Path, panels: dict[str, dict[str, Result]]) -> None:
-    """Draw stress over strain that rises."""
+    """Draw the stress over a rising strain."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 4.2), layout="constrained")

@@ -2,12 +2,11 @@
 
     mpirun -n 2 .venv/bin/python drivers/compression_shear.py --out results/compression_shear
 
-A random cell of glass fibres in epoxy, 50 %, generalized plane strain: cooled without stress, which clamps the fibres,
-then pressed or pulled to S22, then sheared, gamma12, while S22 is held and the other stresses are none.  Bonds have
-strengths of 40 and 60 MPa in opening and shear; debonded faces rub with each coefficient of `--frictions`.  A row has
-the S12 at which the first bond breaks in shear, the largest one, which counts as failure, and that at the strain
-`--strain`: the matrix stays elastic, so S12 would rise again without end.  `--fibres 30` is a cell as large as plies
-are usually drawn.
+A random cell of glass fibres in epoxy, 50 %, generalized plane strain, first cools without stress, which clamps the
+fibres.  Then it is pressed or pulled to S22, and then sheared by gamma12 at constant S22 without other stresses.  Bonds
+have strengths of 40 and 60 MPa in opening and shear; debonded faces rub with each coefficient of `--frictions`.  A row
+has S12 at the first break in shear, the largest S12, which counts as failure, and S12 at the strain `--strain`.  The
+matrix stays elastic, so S12 would rise again without end.  `--fibres 30` gives a cell of the usual size.
 """
 
 import argparse
@@ -30,7 +29,7 @@ COLUMNS = ("friction", "S22", "first break S12", "largest S12", "S12 at end", "h
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Follow the path of each stress across and friction; print, write and draw."""
+    """Follow the path of each transverse stress and friction; print, write and draw."""
     if given.quick:
         given.fibres, given.refine, given.frictions, given.stresses = 2, 0, [0.0, 0.4], [-40.0, 0.0]
     found = {(mu, stress): solved(given, comm, mu, stress) for mu in given.frictions for stress in given.stresses}
@@ -63,7 +62,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, friction: float, stress: 
 
 
 def sheared(result: Result) -> np.ndarray:
-    """(n, 3) gamma12 since shear began, S12, and how many bonds break, at the points of the last leg."""
+    """Return (n, 3) gamma12 since shear began, S12 and numbers of breaking bonds at the points of the last leg."""
     points = result.points
     own = points["load_factor"] > 2 / 3 - 1e-9
     strain, stress = points["strain"][own, -1], points["stress"][own, -1]
@@ -71,7 +70,7 @@ def sheared(result: Result) -> np.ndarray:
 
 
 def row(result: Result) -> list[float]:
-    """S12 at the first break in shear, the largest and the last one, heat of friction, points of the path."""
+    """Return S12 at the first break in shear, largest S12, last S12, heat of friction, and number of points."""
     _, stress, broke = sheared(result).T
     first = stress[np.flatnonzero(broke)[0]] if broke.any() else np.nan
     last = (result.path or ())[-1]
@@ -80,7 +79,7 @@ def row(result: Result) -> list[float]:
 
 
 def write(folder: Path, cooling: float, found: dict[tuple[float, float], Result]) -> list[Path]:
-    """compression_shear.csv and compression_shear.png."""
+    """Write compression_shear.csv and compression_shear.png."""
     from matplotlib.figure import Figure
 
     rows = [[*key, *row(result)] for key, result in found.items()]

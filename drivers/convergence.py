@@ -3,11 +3,11 @@
     mpirun -n 2 .venv/bin/python drivers/convergence.py --out results/convergence
 
 Square cell, 40 % of fibres, plane strain, elements of both orders, each refined from one coarse mesh.  C11 and the
-largest normal traction under E11 = 1 are those of the bonded cell (38), whose exact values are known; G is the energy
-that the tip of an arc of 120 degrees, without contact, releases under the same strain; the peak is the largest S11 of
-the bilinear law of cohesive_fibre.py, with eight teeth.  G and the peak have no exact values: they are compared with
-the two finest meshes of order 2, extrapolated, of which the finest is not drawn.  The peak is that of one event among
-many, so its error is no exact power of the element size.
+largest normal traction under E11 = 1 belong to the bonded cell (38) and have exact values.  G is the energy that the
+tip of an arc of 120 degrees, without contact, releases under the same strain.  The peak is the largest S11 of the
+bilinear law of cohesive_fibre.py, with eight teeth.  References of G and the peak are extrapolated from the two finest
+meshes of order 2, the finest of which is not drawn.  The peak is one event among many, so its error is no exact power
+of the element size.
 """
 
 import argparse
@@ -32,7 +32,7 @@ COLUMNS = ("quantity", "order", "element / width", "elements", "value", "referen
 
 
 class Quantity(NamedTuple):
-    """A number (GPa and widths, MPa of the peak) of a cell, its exact value if known, and its rate by order."""
+    """A number of a cell (GPa and widths; peak in MPa), its exact value if known, and its rate by order."""
 
     title: str
     of: Callable[[argparse.Namespace, Intracomm, dict[str, Any], Path], tuple[float, int]]
@@ -116,7 +116,7 @@ QUANTITIES = {
 
 
 def write(folder: Path, found: dict[str, dict[int, list[Point]]]) -> list[Path]:
-    """convergence.csv and convergence.png."""
+    """Write convergence.csv and convergence.png."""
     from matplotlib.figure import Figure
 
     print(f"{'quantity':<11}order  element  elements{'value':>13}{'reference':>13}{'error':>10}  rate")

@@ -2,12 +2,12 @@
 
     mpirun -n 2 .venv/bin/python drivers/debonding_angle.py --out results/debonding_angle
 
-a: L^ef in plane strain, plane stress, and of long fibres that are free along x3, mean S33 = 0 (the paper has it from a
-three-dimensional cell); debonded faces overlapping freely.
+a: L^ef in plane strain, in plane stress, and for long fibres that are free along x3, mean S33 = 0 (the paper uses a
+three-dimensional cell); debonded faces overlap freely.
 b: Sigma in plane strain under E = [0, 0, 0.2] (40), with and without contact.
 
-The paper prints curves, no numbers.  At both ends of the curves the exact values are known, by multipole series: those
-of the bonded cell, and without contact those of a cell with holes.
+The paper prints curves, no numbers.  At both ends of the curves multipole series give exact values: of the bonded cell,
+and without contact of a cell with holes.
 
 Convention: every fibre has one debonded arc, centred on the positive x1 axis through its own centre; the angle is the
 arc's whole opening in degrees, measured at that centre.  0 is perfect bonding, 360 a loose fibre.
@@ -63,13 +63,13 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def without_S33(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) C_ij - C_i3 C_3j / C_33 on [11, 22, 12] of stiffnesses (n, 6, 6): no mean stress along the fibres."""
+    """Return (n, 3, 3) C_ij - C_i3 C_3j / C_33 on [11, 22, 12] of stiffnesses (n, 6, 6), without mean S33."""
     condensed = stiffness - stiffness[:, :, 2:3] * stiffness[:, 2:3, :] / stiffness[:, 2:3, 2:3]
     return np.asarray(condensed[np.ix_(range(len(stiffness)), [0, 1, 5], [0, 1, 5])])
 
 
 def assert_between(*stiffnesses: NDArray[np.float64]) -> None:
-    """Each stiffness (n, 3, 3) is nowhere above the next: the difference has no eigenvalue below zero but rounding."""
+    """Assert that no stiffness (n, 3, 3) exceeds the next: differences have no negative eigenvalues beyond rounding."""
     for lower, upper in pairwise(stiffnesses):
         least = np.linalg.eigvalsh(upper - lower)[:, 0] / np.abs(upper).max(axis=(1, 2))
         if least.min() < -1e-7:
@@ -77,7 +77,7 @@ def assert_between(*stiffnesses: NDArray[np.float64]) -> None:
 
 
 def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[str, Any]) -> list[Path]:
-    """debonding_angle.csv and debonding_angle.png."""
+    """Write debonding_angle.csv and debonding_angle.png."""
     from matplotlib.figure import Figure
 
     _print_ends(free, shear)

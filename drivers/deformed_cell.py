@@ -3,7 +3,7 @@
     mpirun -n 2 .venv/bin/python drivers/deformed_cell.py --out results/deformed_cell
 
 The debonding angle is the whole opening of one arc on every fibre, centred on the positive x1 axis through its centre.
-Without contact the faces overlap, and the material that is drawn last hides the other.
+Without contact the faces overlap, and the material drawn last hides the other material.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def largest_overlap(result: Result, comm: Intracomm) -> float:
-    """Return how far the matrix intrudes into a fibre at most: minus the smallest gap at the nodes of all ranks."""
+    """Return the largest overlap of matrix and fibre: minus the smallest gap at the nodes of all ranks."""
     if result.fields is None:
         raise ValueError("the case was run without fields")
     (state,) = result.fields.states
@@ -44,7 +44,7 @@ def largest_overlap(result: Result, comm: Intracomm) -> float:
 
 
 def write(folder: Path, results: dict[str, Result], overlaps: dict[str, float]) -> list[Path]:
-    """deformed_cell.csv and deformed_cell.png."""
+    """Write deformed_cell.csv and deformed_cell.png."""
     from matplotlib.figure import Figure
 
     print("the paper has no numbers, but contact without overlap, which stiffens the shear and makes normal stresses")

@@ -2,8 +2,8 @@
 
     mpirun -n 2 .venv/bin/python drivers/effective_stiffness.py --out results/effective_stiffness
 
-Fibres of 40 % with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299, perfectly bonded.  A result folder for
-each case, and entries.png with the stiffnesses over the fibre fraction if --fractions are given.
+Fibres of 40 % with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299, perfectly bonded.  Each case gets a result
+folder; with --fractions, entries.png shows the stiffnesses over the fibre fraction.
 """
 
 import argparse
@@ -28,7 +28,7 @@ ENTRIES = {"C11": (0, 0), "C12": (0, 1), "C33": (2, 2)}
 
 
 def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Run the four cases, and the fractions asked for; print a table and draw it."""
+    """Run the four cases and the given fractions; print a table and draw it."""
     if comm.rank == 0:
         print(f"{'cell':<10}{'plane':<8}" + "".join(f"{name:>13}{'error':>10}" for name in ENTRIES))
     for (geometry, plane), reference in REFERENCE.items():
@@ -45,7 +45,7 @@ def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, plane: str, fraction: float) -> Any:
-    """(3, 3) L^ef of one cell; its results go to a folder of its own."""
+    """Return L^ef (3, 3) of one cell; its results go to a separate folder."""
     name = f"{geometry}_{plane}_{round(100 * fraction)}"
     document: dict[str, Any] = {
         "name": name,

@@ -1,12 +1,12 @@
-"""Debonding of one fibre that breaks by energy: the size effect that a strength cannot show.
+"""Debonding of one fibre by energy: a size effect that a strength alone cannot show.
 
     mpirun -n 2 .venv/bin/python drivers/energy_debonding.py --out results/energy_debonding
 
 One glass fibre in much epoxy, plane strain, under remote uniaxial tension s11: a square cell of 60 radii, strained by
 its own compliance.  The interface has springs of 2025 and 506.25 MPa/um and a toughness of 2 J/m2, which is a strength
-of 90 MPa in pure opening.  For each radius the remote stress at which the first bond breaks, beside the exact one of an
-infinite matrix (Tavara, Mantic, Graciani, Paris 2011), and how far the two debonds, at both poles, then run at once
-before the stress must rise again.
+of 90 MPa in pure opening.  For each radius the driver compares the remote stress at the first break with the exact
+stress for an infinite matrix (Tavara, Mantic, Graciani, Paris 2011).  The semi-angle tells how far the debonds at both
+poles then run at once, before the stress must rise again.
 """
 
 import argparse
@@ -30,7 +30,7 @@ COLUMNS = ("radius", "onset", "exact onset", "debonding angle", "elements")
 
 
 class Onset(NamedTuple):
-    """Remote stress (MPa), the exact one, semi-angle to which each debond runs (degrees), and elements."""
+    """Remote stress and exact stress (MPa), semi-angle to which each debond runs (degrees), and elements."""
 
     stress: float
     exact: float
@@ -46,7 +46,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def onset(given: argparse.Namespace, comm: Intracomm, radius: float) -> Onset:
-    """Return the first break of one fibre and what follows it at once."""
+    """Return the onset of one fibre: the first break and the debond that follows at once."""
     exact = exact_onset(radius)
     stiffness = solved(given, comm, radius, analysis={"type": "stiffness", "plane": "strain"}).effective_stiffness
     strain = np.linalg.solve(np.array(stiffness), [1.5 * exact, 0.0, 0.0])
@@ -119,7 +119,7 @@ def exact_onset(radius: float) -> float:
 
 
 def write(folder: Path, found: dict[float, Onset]) -> list[Path]:
-    """energy_debonding.csv and energy_debonding.png."""
+    """Write energy_debonding.csv and energy_debonding.png."""
     from matplotlib.figure import Figure
 
     print("radius um  onset MPa   exact   error   debonding angle  elements")

@@ -3,8 +3,8 @@
     mpirun -n 2 .venv/bin/python drivers/fibre_fraction_sweep.py --out results/fibre_fraction_sweep
 
 Fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), perfectly bonded.  Each random point is the
-mean of several arrangements.  It is a sweep: started again it goes on; statistics.csv and moduli.png are its table and
-its picture.
+mean of several arrangements.  The driver is a sweep: started again, it continues.  It writes statistics.csv and
+moduli.png.
 """
 
 import argparse

@@ -1,10 +1,9 @@
-"""How the fibres of a cross-section are placed: neighbours, local fractions, directions, Ripley's L beside simulations.
+"""Placement of fibres in a cross-section: neighbours, local fractions, directions, Ripley's L beside simulations.
 
     .venv/bin/python drivers/fibre_statistics.py meshes/clustered.csv --out results/statistics
 
-The source is a table of fibres in a window of a micrograph, or a folder of results or a case file, whose cells are
-periodic.  Ellipses count as discs of the same area.  With --out, tables of all quantities, of g(r) and of K(r) are
-written, and statistics.png.
+The source is a table of fibres in a window of a micrograph, or the periodic cell of a folder of results or a case file.
+Ellipses count as discs of the same area. --out writes tables of all quantities, of g(r) and K(r), and statistics.png.
 """
 
 import argparse
@@ -137,9 +136,9 @@ def pair_columns(found: FibreStatistics) -> dict[str, Array]:
 def run(
     source: Path, out: Path | None, model: str, simulations: int, size: tuple[float, float] | None = None
 ) -> list[str]:
-    """Measure, write three tables and a picture to `out` if it is given; returns the lines to print.
+    """Measure, write three tables and a picture to `out`, if given, and return the lines to print.
 
-    `size` is that of the window of a table that gives none.
+    `size` is the window size for a table that gives none.
 
     Raises:
         CaseError, MeshError: the source is faulty, or the model has no such pattern.
@@ -156,8 +155,8 @@ def run(
 def pattern(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     """Return the fibres, at least two, in the source's unit of length. On one rank.
 
-    Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
-    a periodic cell. Voids are left out; ellipses count as discs of the same centres and areas.
+    Fibres of a table lie in a window, of this width and height if the table gives none; fibres of a folder or a case
+    lie in a periodic cell. Voids are left out; ellipses count as discs of the same centres and areas.
 
     Raises:
         CaseError, MeshError: the source is faulty, a fibre is no circle or ellipse, or there are fewer than two.

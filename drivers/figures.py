@@ -46,7 +46,7 @@ def add_output_options(options: argparse.ArgumentParser) -> None:
 
 
 def written(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the section [output] that these options ask for."""
+    """Return the section [output] for these options."""
     return {"stress_unit": "GPa", "fields": options.fields or options.pictures, "pictures": options.pictures}
 
 
@@ -59,7 +59,7 @@ def solved(
     keep_fields: bool = False,
     **rest: Any,
 ) -> Result:
-    """Return the result, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
+    """Return the result of the case `name`, on every rank, in a separate folder; `rest` are the other sections."""
     cell = {
         "geometry": geometry,
         "fibre_fraction": options.fibre_fraction,

@@ -1,11 +1,11 @@
-"""Friction under cyclic shear: how much a composite with debonded fibres damps, over amplitude and pressure.
+"""Friction under cyclic shear: damping of a composite with debonded fibres, over amplitude and pressure.
 
     mpirun -n 2 .venv/bin/python drivers/hysteresis.py --out results/hysteresis
 
-A random cell of glass fibres in epoxy that nothing but pressure holds, plane strain.  First a pressure from all sides,
-S11 = S22 = -p, then gamma12 to and fro, each amplitude several times.  The area of the last loop of an amplitude is the
-heat of friction in it, per area of the cell; beside the largest energy stored it gives the loss factor
-area / (2 pi stored).  Coulomb's law has no unit of stress: amplitudes over pressures give all the loops.
+Only pressure holds the glass fibres in the epoxy of a random cell, plane strain.  A pressure from all sides comes
+first, S11 = S22 = -p, then gamma12 to and fro, each amplitude several times.  The area of the last loop of an amplitude
+is the heat of friction per area of the cell.  With the largest stored energy, the loss factor is area / (2 pi stored).
+Coulomb's law has no stress scale, so the loops depend only on amplitude / pressure.
 """
 
 import argparse
@@ -58,7 +58,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, pressure: float) -> Resul
 
 
 def loops(result: Result, amplitudes: list[float], cycles: int) -> list[Loop]:
-    """(n, 3) gamma12, S12 and stored energy of the last cycle of each amplitude."""
+    """Return (n, 3) gamma12, S12 and stored energy of the last cycle of each amplitude."""
     points = result.points
     own = np.column_stack([points["strain"][:, 2], points["stress"][:, 2], points["stored"]])
     legs = 1 + len(amplitudes) * (1 + 2 * cycles)
@@ -69,14 +69,14 @@ def loops(result: Result, amplitudes: list[float], cycles: int) -> list[Loop]:
 
 
 def row(loop: Loop, amplitude: float) -> list[float]:
-    """Area of a loop, its loss factor and secant modulus."""
+    """Return the area of a loop, its loss factor and secant modulus."""
     strain, stress, stored = loop.T
     area = ((stress[1:] + stress[:-1]) * np.diff(strain)).sum() / 2
     return [area, area / (2 * np.pi * (stored.max() - stored.min())), np.ptp(stress) / (2 * amplitude)]
 
 
 def write(given: argparse.Namespace, found: dict[float, Result]) -> list[Path]:
-    """hysteresis.csv and hysteresis.png."""
+    """Write hysteresis.csv and hysteresis.png."""
     rows = []
     print("pressure MPa  amplitude   loop area MPa  loss factor  secant modulus MPa  points")
     for pressure, result in found.items():
@@ -89,7 +89,7 @@ def write(given: argparse.Namespace, found: dict[float, Result]) -> list[Path]:
 
 
 def draw(given: argparse.Namespace, found: dict[float, Result], rows: Loop) -> None:
-    """Loops of each amplitude at the middle pressure, areas over amplitudes, loss factors over amplitude / pressure."""
+    """Draw the loops at the middle pressure, areas over amplitudes, loss factors over amplitude / pressure."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 4.2), layout="constrained")

@@ -1,12 +1,12 @@
-"""Toughness and strengths of an interface from mean peaks of a ply, which no test of the interface itself gives.
+"""Fit toughness and strengths of an interface, which no interface test gives, to mean peaks of a ply.
 
     mpirun -n 2 .venv/bin/python drivers/interface_toughness.py --out results/interface_toughness
 
 A glass/epoxy ply is loaded across its fibres in tension, which opens interfaces, and in compression, which shears them.
-Its mean peaks are those of random cells whose bonds break by energy, on springs that are given, with a toughness of
-2 J/m2 in opening and a mode sensitivity of 0.25.  The fit of the same cells, of which each datum has the scatter of the
-mean times the root of their number, returns both: peaks scale as the root of the toughness, by the sensitivity their
-derivatives are differences.  Strengths of single bonds follow, sqrt(2 k_n G_I) and in shear sqrt(2 k_t G_II).
+The mean peaks come from random cells whose bonds break by energy, on given springs, with a toughness of 2 J/m2 in
+opening and a mode sensitivity of 0.25.  A fit of the same cells returns both constants; each datum has the scatter of
+the mean times the root of the number of cells.  Peaks scale as the root of the toughness; derivatives by the
+sensitivity are differences.  Strengths of single bonds follow: sqrt(2 k_n G_I), and in shear sqrt(2 k_t G_II).
 """
 
 import argparse
@@ -31,7 +31,7 @@ STD = 0.02  # of a mean peak, relative
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Measure mean peaks, fit, and print the estimates beside the truth."""
+    """Compute mean peaks, fit, and print the estimates beside the true constants."""
     if given.quick:
         given.fibres, given.seeds, given.refine = 2, 1, 0
     tests: list[dict[str, Any]] = [
@@ -52,7 +52,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def report(found: dict[str, Any], known: dict[str, float]) -> None:
-    """Print the estimates beside the truth, and the strengths of single bonds."""
+    """Print the estimates beside the true constants, and the strengths of single bonds."""
     print(f"\n{'':<20}{'plies made of':>14}{'estimate':>12}{'+-':>12}")
     for name, own in found.items():
         print(f"{name:<20}{TRUTH[name]:>14g}{own['estimate']:>12.6g}{own['std']:>12.2g}")

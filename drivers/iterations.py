@@ -1,4 +1,4 @@
-"""Iterations of the dual problem over the refinement of the hexagonal cell, its bodies whole: they do not grow.
+"""Iterations of the dual problem, which do not grow with the refinement of the hexagonal cell of whole bodies.
 
 mpirun -n 2 .venv/bin/python drivers/iterations.py --refine 1 2 3 4 5
 """

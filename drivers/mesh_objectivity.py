@@ -1,12 +1,12 @@
-"""Dependence of a curve on its mesh: bonds that break by strength beside bonds that break by energy, on four meshes.
+"""Mesh dependence of a curve: bonds that break by strength beside bonds that break by energy, on four meshes.
 
     mpirun -n 2 .venv/bin/python drivers/mesh_objectivity.py --out results/mesh_objectivity
 
-A square cell with one glass fibre of 7.5 um in epoxy, 40 %, plane strain, E11 alone.  By strength: glued bonds of
-90 MPa.  By energy: springs of 2025 and 506.25 MPa/um and a toughness of 2 J/m2, which is the same strength in pure
-opening; where debonding has begun bonds break by the energy of their own springs ("springs"), or by what their break
-releases ("released").  The curves are those of a strain that only rises.  Strains are multiples of that of the onset,
-0.01175333 with springs.
+A square cell with one glass fibre of 7.5 um in epoxy, 40 %, plane strain, E11 alone.  By strength: rigid bonds of 90
+MPa.  By energy: springs of 2025 and 506.25 MPa/um and a toughness of 2 J/m2, which is the same strength in pure
+opening.  Where debonding has begun, bonds break by the energy of their own springs ("springs"), or by the energy that
+their break releases ("released").  The curves are responses to a rising strain.  Strains are multiples of the onset
+strain, 0.01175333 with springs.
 """
 
 import argparse
@@ -71,13 +71,13 @@ def solved(given: argparse.Namespace, comm: Intracomm, bonds: str, refine: int) 
 
 
 def element(result: Result) -> float:
-    """Length of the elements on the interface, um."""
+    """Return the length of the elements on the interface, um."""
     first = (result.path or ())[0]
     return 2 * np.pi * RADIUS / (first.bonded + first.open + first.closed)
 
 
 def numbers(result: Result) -> list[float]:
-    """Stress at onset, stresses at multiples of the onset's strain, and the debonded share at the end."""
+    """Return the stress at onset, the stresses at multiples of the onset strain, and the debonded share at the end."""
     points, rising = result.path or (), result.rising_strain()
     total = points[0].bonded + points[0].open + points[0].closed
     # Where the stress falls at constant strain, what is left.
@@ -91,7 +91,7 @@ def numbers(result: Result) -> list[float]:
 
 
 def write(folder: Path, found: dict[tuple[str, int], Result]) -> list[Path]:
-    """mesh_objectivity.csv and mesh_objectivity.png."""
+    """Write mesh_objectivity.csv and mesh_objectivity.png."""
     from matplotlib.figure import Figure
 
     print("bonds     element um  onset S11 " + "".join(f"{f'at {t:g}':>9}" for t in AT) + "  debonded at 3")

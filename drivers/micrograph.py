@@ -2,9 +2,9 @@
 
     mpirun -n 2 .venv/bin/python drivers/micrograph.py --out results/micrograph
 
-meshes/micrograph.csv lists about 200 fibres in a window, which is made periodic.  Glass/epoxy in plane strain, bonds
-of 40 MPa in tension and 60 MPa in shear.  Beside each fibre's largest traction under S11 stands its local fibre
-fraction, its area over that of its Voronoi cell.
+meshes/micrograph.csv lists about 200 fibres in a window, which is made periodic.  Glass/epoxy in plane strain, bonds of
+40 MPa in tension and 60 MPa in shear.  The table lists each fibre's largest traction under S11 and its local fibre
+fraction, fibre area / Voronoi cell area.
 """
 
 import argparse
@@ -28,7 +28,7 @@ STRENGTHS = {"normal_strength": 40.0, "tangential_strength": 60.0}  # MPa
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Both analyses; print, write and draw."""
+    """Run both analyses; print, write and draw."""
     stiffness = solved(given, comm, "stiffness", keep_fields=True)
     onset = solved(
         given,
@@ -44,7 +44,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 def solved(
     given: argparse.Namespace, comm: Intracomm, analysis: str, keep_fields: bool = False, **sections: Any
 ) -> Result:
-    """One analysis of the window."""
+    """Return the result of one analysis of the window."""
     document = {
         "name": analysis,
         "cell": {
@@ -63,14 +63,14 @@ def solved(
 
 
 def local_fractions(result: Result) -> np.ndarray:
-    """(N,) area of each fibre / area of its Voronoi cell."""
+    """Return (N,) area of each fibre / area of its Voronoi cell."""
     cell, fibres = result.cell, result.fibres
     centres, radii = np.array([fibre.centre for fibre in fibres]), np.array([fibre.radius for fibre in fibres])
     return voronoi_cells(FibrePattern(cell.width, cell.height, centres, radii, periodic=True)).fractions
 
 
 def largest_tractions(result: Result, fields: Any) -> np.ndarray:
-    """(N,) largest normal traction of each fibre / S11, under a stress S11 alone."""
+    """Return (N,) largest normal traction of each fibre / S11, under a stress S11 alone."""
     strain = np.linalg.solve(result.effective_stiffness, [1.0, 0.0, 0.0])
     traction = sum(e * state.traction[:, 0] for e, state in zip(strain, fields.states, strict=True))
     largest = np.zeros(len(result.fibres))
@@ -79,7 +79,7 @@ def largest_tractions(result: Result, fields: Any) -> np.ndarray:
 
 
 def write(folder: Path, stiffness: Result, onset: Result, fields: Any) -> list[Path]:
-    """micrograph.csv and micrograph.png."""
+    """Write micrograph.csv and micrograph.png."""
     from matplotlib.figure import Figure
 
     fractions, tractions = local_fractions(stiffness), largest_tractions(stiffness, fields)
@@ -113,7 +113,7 @@ def write(folder: Path, stiffness: Result, onset: Result, fields: Any) -> list[P
 
 
 def draw_fibres(axes: Any, result: Result, tractions: np.ndarray, first: list[int]) -> None:
-    """Draw the cell with its fibres by their largest tractions, the first to break in the colour of their points."""
+    """Draw the fibres coloured by their largest tractions, the first to break in the colour of their points."""
     from matplotlib.collections import EllipseCollection
 
     cell = result.cell

@@ -1,10 +1,10 @@
-"""Closed estimates against cells: all constants of glass/epoxy and its like over fibre fraction and contrast.
+"""Closed-form estimates against cells: all constants of glass/epoxy and similar plies over fraction and contrast.
 
     mpirun -n 2 .venv/bin/python drivers/micromechanics.py --out results/micromechanics
 
-The comparison that the paper's conclusion asks for.  Long fibres (plane = "generalized") in square, hexagonal and
-random cells; constants are those of the nearest transversely isotropic material, of random cells the mean over seeds.
-Every result has the estimates beside its own constants; nothing but the phases and their fractions enters them.
+The paper's conclusion asks for this comparison.  Long fibres (plane = "generalized") in square, hexagonal and random
+cells; constants describe the nearest transversely isotropic material, in random cells the mean over seeds.  Every
+result lists the estimates beside its own constants; only the phases and their fractions enter the estimates.
 """
 
 import argparse
@@ -88,7 +88,7 @@ def write(
     cells: Table,
     estimates: dict[str, dict[tuple[float, float], NDArray[np.float64]]],
 ) -> list[Path]:
-    """micromechanics.csv, the errors on the terminal, and micromechanics.png."""
+    """Write micromechanics.csv and micromechanics.png; print the errors."""
     rows: list[list[Any]] = [["cell", *key, *values] for key, values in cells.items()]
     rows += [
         ["estimate", method, *key, *values] for method, found in estimates.items() for key, values in found.items()

@@ -31,9 +31,9 @@ class PairFunctions:
     """Functions of the distance between centres.
 
     Attributes:
-        r: (m,) distances, in equal steps; the first one is one step.
-        ripley_k: (m,) K(r), mean number of other fibres within r of one / number of fibres per area.
-        radial: (m,) radial distribution function g in the step that ends at r: K's growth / the area of the ring.
+        r: (m,) distances in equal steps; the first distance is one step.
+        ripley_k: (m,) K(r), mean number of other fibres within r of a fibre / number of fibres per area.
+        radial: (m,) radial distribution function g in the step that ends at r: growth of K / area of the ring.
     """
 
     r: Float
@@ -42,12 +42,12 @@ class PairFunctions:
 
     @property
     def ripley_l(self) -> Float:
-        """(m,) L(r) = sqrt(K / pi), which is r for complete spatial randomness."""
+        """The function L(r) = sqrt(K / pi) (m,), which is r for complete spatial randomness."""
         return np.asarray(np.sqrt(self.ripley_k / pi))
 
 
 def distances(pattern: FibrePattern) -> Float:
-    """(m,) distances of the pair functions: up to half of the shorter side and at most `FAR` mean spacings."""
+    """Return distances (m,) of the pair functions: up to half of the shorter side and at most `FAR` mean spacings."""
     reach = min(float(pattern.size.min()) / 2, FAR * sqrt(pattern.area / pattern.count))
     steps = max(10, round(reach / (STEP * pattern.mean_radius)))
     return np.asarray(reach * np.arange(1, steps + 1) / steps)
@@ -67,7 +67,7 @@ def smallest_gap(pattern: FibrePattern) -> float:
 
 
 def pair_vectors(pattern: FibrePattern, reach: float) -> Float:
-    """(k, 2) from each centre to every other one at most `reach` away, images and its own among them."""
+    """Return vectors (k, 2) from each centre to all centres and images, also its own images, at most `reach` away."""
     points, _ = pattern.images(reach * (1 + 1e-9))
     own = points[: pattern.count]
     near = cKDTree(own).sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
@@ -76,11 +76,11 @@ def pair_vectors(pattern: FibrePattern, reach: float) -> Float:
 
 
 def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
-    """K(r) = A / (N (N - 1)) sum_{i != j} w_ij [|x_i - x_j| <= r] at the distances r (m,), and g = K' / (2 pi r).
+    """Return K(r) = A / (N (N - 1)) sum_{i != j} w_ij [|x_i - x_j| <= r] at distances r (m,), and g = K' / (2 pi r).
 
-    In a periodic cell w = 1, and r is at most half of the shorter side, up to which pairs have one image each; in a
-    window w_ij = A / ((width - |dx|) (height - |dy|)), the translation correction [Ohser & Stoyan 1981], which keeps K
-    and g unbiased.  Needs two fibres.
+    In a periodic cell w = 1, and r is at most half of the shorter side, so that each pair has one image; in a window
+    w_ij = A / ((width - |dx|) (height - |dy|)), the translation correction [Ohser & Stoyan 1981], which keeps K and g
+    unbiased.  Needs two fibres.
     """
     vectors = pair_vectors(pattern, float(r[-1]))
     place = np.searchsorted(r, np.hypot(*vectors.T))  # of the least r that is not below the distance
@@ -92,10 +92,10 @@ def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
 
 
 def pair_directions(pattern: FibrePattern, reach: float) -> Float:
-    """(SECTORS,) share of the pairs at most `reach` apart in each sector of directions / that of all directions alike.
+    """Return (SECTORS,) share of pairs at most `reach` apart in each sector of directions / share if all were alike.
 
-    Sectors of 180 / SECTORS degrees, the first about x1, the others in order towards x2; a pair has no front and back.
-    Pairs of a window have the weights of `pair_functions`.  All are 0 if no two fibres are that near.
+    Sectors have 180 / SECTORS degrees, the first about x1, the others in order towards x2; a pair has no front and
+    back.  Pairs of a window have the weights of `pair_functions`.  All shares are 0 if no two fibres are that near.
     """
     vectors = pair_vectors(pattern, reach)
     angle = np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0]))
@@ -105,7 +105,7 @@ def pair_directions(pattern: FibrePattern, reach: float) -> Float:
 
 
 def _translation_weights(pattern: FibrePattern, vectors: Float) -> Float:
-    """(k,) 1 / the share of the places of the window at which a pair with this vector fits in."""
+    """Return weights (k,): 1 / the share of the window's places at which a pair with this vector fits in."""
     if pattern.periodic:
         return np.ones(len(vectors))
     return np.asarray(pattern.area / np.prod(pattern.size - np.abs(vectors), axis=1))
@@ -116,11 +116,11 @@ class Envelope:
     """A function of a pattern beside those of n simulations.
 
     Attributes:
-        low, high: (m,) least and largest values of the simulations: at one place a pattern of the model lies outside
+        low, high: (m,) least and largest values of the simulations; at one place a pattern of the model lies outside
             with the probability 2 / (n + 1).
-        mean: (m,) of the simulations.
-        p_value: of all places together: share of the n + 1 functions, the pattern's among them, whose largest deviation
-            from the mean of all is at least that of the pattern's.
+        mean: (m,) mean of the simulations.
+        p_value: for all places together, the share of the n + 1 functions, with the pattern's own, that deviate from
+            the mean of all at least as far as the pattern's.
     """
 
     low: Float
@@ -130,10 +130,9 @@ class Envelope:
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
-    """Return the same fibres elsewhere, as those of random cells are placed (`relax`).
+    """Return the same fibres at other places, found like random cells (`relax`).
 
-    No gap is smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a
-    periodic cell.
+    No gap is smaller than the smallest gap of the pattern.  A window is treated as a periodic cell.
 
     Raises:
         MeshError: no such pattern is found.
@@ -145,7 +144,7 @@ def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: 
 
 
 def poisson(pattern: FibrePattern, generator: np.random.Generator) -> FibrePattern:
-    """Complete spatial randomness: as many centres, each anywhere in the rectangle, whether fibres overlap or not."""
+    """Return complete spatial randomness: as many centres anywhere in the rectangle, whether fibres overlap or not."""
     return replace(pattern, centres=generator.random((pattern.count, 2)) * pattern.size)
 
 
@@ -156,7 +155,7 @@ def envelope(
     count: int,
     seed: int = 0,
 ) -> Envelope:
-    """Return the function (m,) of `count` simulations of a pattern, estimated in each as in the pattern itself.
+    """Return a function (m,) of a pattern beside `count` simulations, all estimated in the same way.
 
     The test by the largest deviation is exact: under the model all the functions are exchangeable [Ripley 1977].
     """
@@ -174,10 +173,10 @@ class FibreStatistics:
 
     Attributes:
         pattern: the fibres.
-        neighbours: the three nearest of each.
+        neighbours: the three nearest fibres of each fibre.
         pairs: g, K and L.
-        random: L beside that of simulations.
-        directions: (12,) those of near pairs, see `pair_directions`; 1 where all are alike.
+        random: L beside the L of simulations.
+        directions: (12,) `pair_directions` of near pairs; 1 if all are alike.
         cells: the Voronoi cells.
     """
 
@@ -195,7 +194,7 @@ def measure(
     simulations: int,
     seed: int = 0,
 ) -> FibreStatistics:
-    """Return the statistics of at least two fibres, L beside so many simulations by `simulate`."""
+    """Return the statistics of at least two fibres, with L beside simulations by `simulate`."""
     neighbours, r = nearest_neighbours(pattern), distances(pattern)
     nearest = neighbours.distances[:, 0]
     return FibreStatistics(
@@ -213,12 +212,12 @@ class VoronoiCells:
     """The Voronoi cells of N fibres.
 
     Attributes:
-        areas: (N,), with the sum width x height.
-        fractions: (N,) local fibre fractions pi R^2 / area, whose mean, weighted with the areas, is the fibre fraction.
-            Cells of the centres have no radii: of unequal fibres close together that of the larger may be above 1.
-        weights: (N,), with the sum 1, of the cells in a distribution: 1/N in a periodic cell.  In a window a cell
-            counts if it is what it would be in larger surroundings, with the weight 1 / (share of the places of the
-            window where it would fit in, with all that decides on it): larger cells are fewer.
+        areas: (N,) with the sum width x height.
+        fractions: (N,) local fibre fractions pi R^2 / area; their mean, weighted with the areas, is the fibre fraction.
+            Voronoi cells ignore radii: where unequal fibres are close, the larger fibre's fraction may exceed 1.
+        weights: (N,) weights of the cells in a distribution, with the sum 1: 1/N in a periodic cell.  In a window a
+            cell counts if larger surroundings would not change it, with the weight 1 / (share of the window's places
+            where the cell and all that determines it would fit in), because fewer large cells fit in.
     """
 
     areas: Float
@@ -227,22 +226,22 @@ class VoronoiCells:
 
     @property
     def whole(self) -> Bool:
-        """(N,) whether a cell counts; in a window some do not."""
+        """Whether each cell counts (N,); in a window some do not."""
         return np.asarray(self.weights > 0)
 
     @property
     def mean_fraction(self) -> float:
-        """Weighted mean of the local fractions, NaN if no cell counts."""
+        """The weighted mean of the local fractions, NaN if no cell counts."""
         return float(self.weights @ self.fractions) if self.weights.any() else np.nan
 
     @property
     def fraction_deviation(self) -> float:
-        """Their weighted standard deviation."""
+        """The weighted standard deviation of the local fractions."""
         return float(np.sqrt(self.weights @ (self.fractions - self.mean_fraction) ** 2))
 
 
 def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
-    """Cells of a periodic pattern by images around it, of a window by mirror images, which cut them at its sides.
+    """Return the cells, by images around a periodic pattern, by mirror images at the sides of a window.
 
     A cell in a window counts if the circles about its corners, through its centre, lie within the window: no fibre
     outside could change it.
@@ -266,7 +265,7 @@ def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
 
 
 def _weights(pattern: FibrePattern, lowest: Float, highest: Float) -> Float:
-    """Return those of cells whose circles lie between the corners `lowest` and `highest` (N, 2)."""
+    """Return the weights of cells whose circles lie between the corners `lowest` and `highest` (N, 2)."""
     if pattern.periodic:
         return np.full(pattern.count, 1 / pattern.count)
     within = np.all((lowest >= 0) & (highest <= pattern.size), axis=1)
@@ -276,7 +275,7 @@ def _weights(pattern: FibrePattern, lowest: Float, highest: Float) -> Float:
 
 
 def _periodic(pattern: FibrePattern) -> Float:
-    """Return the centres and their eight images: of no others is an edge of a cell's boundary."""
+    """Return the centres and their eight images; no other images bound a cell."""
     shifts = [np.array(step) * pattern.size for step in product((-1, 0, 1), repeat=2) if any(step)]
     return np.concatenate([pattern.wrapped, *(pattern.wrapped + shift for shift in shifts)])
 

@@ -1,9 +1,9 @@
-"""Tests of a glass/epoxy ply: tension across the fibres and shear along them, as it is and after cooling.
+"""Tests of a glass/epoxy ply: tension across the fibres and shear along them, without and after cooling.
 
     mpirun -n 2 .venv/bin/python drivers/ply_strength.py --out results/ply_strength
 
-A random cell of long fibres that debond by energy.  Tension is a uniaxial test, E22 rising, no other stress; shear is
-gamma23, along the fibres, rising.  Cooling comes first, free of stress: the matrix shrinks on the fibres.
+A random cell of long fibres that debond by energy.  Tension is a uniaxial test with rising E22 and no other stress;
+shear is a rising gamma23, along the fibres.  Cooling comes first, free of stress: the matrix shrinks onto the fibres.
 """
 
 import argparse
@@ -71,7 +71,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
 
 
 def curve(result: Result, component: int) -> np.ndarray:
-    """(n, 2) strain since the load began, from zero, and stress, as a test with rising strain sees them."""
+    """Return (n, 2) strain since the load began and stress, as in a test with rising strain."""
     if len(result.case["path"]["waypoints"]) == 1:
         strain, *stresses = result.rising_strain().values()
         return np.column_stack([strain, stresses[component]])
@@ -83,7 +83,7 @@ def curve(result: Result, component: int) -> np.ndarray:
 
 
 def row(result: Result, component: int) -> list[float]:
-    """Modulus, stress of the first break, peak, its strain, and points of the path."""
+    """Return modulus, stress of the first break, peak, strain at the peak, and number of points."""
     found = curve(result, component)
     broken = [point.stress[component] for point in result.path or () if point.broke]
     peak = int(found[:, 1].argmax())
@@ -91,7 +91,7 @@ def row(result: Result, component: int) -> list[float]:
 
 
 def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
-    """ply_strength.csv and ply_strength.png."""
+    """Write ply_strength.csv and ply_strength.png."""
     from matplotlib.figure import Figure
 
     rows = [[test, temperature, *row(result, TESTS[test][2])] for (test, temperature), result in found.items()]

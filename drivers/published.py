@@ -25,7 +25,7 @@ from feti_homog import Case, launch
 
 
 class Row(NamedTuple):
-    """A quantity of a source: published number and ours."""
+    """A quantity of a source: published and computed number."""
 
     source: str
     quantity: str
@@ -49,7 +49,7 @@ def isotropic(young: float, poisson: float, expansion: float | None = None) -> d
 
 
 def measured(fibre: dict[str, float], matrix: dict[str, float], fraction: float, *values: float) -> Ply:
-    """Return a ply of the WWFE and its values, the first ones of OF_PLY."""
+    """Return a ply of the WWFE and its values, in the order of OF_PLY."""
     return Ply(fibre, matrix, fraction, "hexagonal", dict(zip(OF_PLY, values, strict=False)))
 
 

@@ -3,9 +3,9 @@
     mpirun -n 2 .venv/bin/python drivers/representative_cell.py --out results/representative_cell
 
 Random cells of 50 % fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), plane strain, several
-arrangements of each number of fibres.  A cell is representative where the mean no longer moves by more than its
-confidence interval, and one arrangement scatters by less than what is asked for.  It is a sweep: started again it
-goes on; statistics.csv and representative_cell.png are its table and its picture.
+arrangements of each number of fibres.  A cell is representative if the mean no longer moves by more than its confidence
+interval, and one arrangement scatters by less than a given share.  The driver is a sweep: started again, it continues.
+It writes statistics.csv and representative_cell.png.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
-    """Return the sweep as a TOML file would have it. The mesh is as fine beside each fibre, whatever their number."""
+    """Return the sweep as a TOML file would have it; the mesh beside a fibre is as fine for any number of fibres."""
     cell = {
         "geometry": "random", "fibre_fraction": given.fibre_fraction, "min_gap": given.min_gap,
         "refine": given.refine, "order": given.order, "seed": given.seed,

@@ -1,4 +1,4 @@
-"""statistics.png: fibres with their local fractions, and the distributions of what was measured of them."""
+"""Draw statistics.png: fibres with their local fractions, and the distributions of all measured quantities."""
 
 from itertools import product
 from pathlib import Path
@@ -20,7 +20,7 @@ BINS = 20
 
 
 def write(directory: Path, found: FibreStatistics, name: str, model: str) -> Path:
-    """Draw statistics.png in a folder; returns its path.  On one rank.  Raises FetiHomogError if it cannot."""
+    """Draw statistics.png in a folder; return its path.  On one rank.  Raises FetiHomogError if it cannot."""
     with mpl.rc_context(STYLE):
         return save(figure(found, name, model), directory / "statistics.png")
 
@@ -66,7 +66,7 @@ def fibres(axes: Axes, found: FibreStatistics) -> None:
 
 
 def nearest_distances(axes: Axes, found: FibreStatistics) -> None:
-    """Weighted distributions of the distances to the three nearest centres."""
+    """Draw weighted distributions of the distances to the three nearest centres."""
     near, size = found.neighbours, 2 * found.pattern.mean_radius
     for k, (colour, ordinal) in enumerate(zip(COLOURS, ORDINALS, strict=True)):
         order = np.argsort(near.distances[:, k])
@@ -88,7 +88,7 @@ def _radial(axes: Axes, found: FibreStatistics) -> None:
 
 
 def _clustering(axes: Axes, found: FibreStatistics, model: str) -> None:
-    """L(r) - r, above zero where fibres cluster; the band is that of the simulations."""
+    """Draw L(r) - r, above zero where fibres cluster; the band shows the simulations."""
     radius, r = found.pattern.mean_radius, found.pairs.r
     low, high, mean = ((values - r) / radius for values in (found.random.low, found.random.high, found.random.mean))
     axes.fill_between(r / radius, low, high, color="0.87", label=f"simulations, {model}")
@@ -109,7 +109,7 @@ def _local_fractions(axes: Axes, found: FibreStatistics) -> None:
 
 
 def _directions(axes: Any, found: FibreStatistics) -> None:
-    """Bars of the near pairs' directions; each direction twice, for a pair has no front and back."""
+    """Draw bars of the near pairs' directions; each direction twice, because a pair has no front and back."""
     angles = np.arange(2 * SECTORS) * np.pi / SECTORS
     axes.bar(angles, np.tile(found.directions, 2), width=np.pi / SECTORS, color="#9fb6da", edgecolor=COLOURS[0])
     axes.plot(np.linspace(0, 2 * np.pi, 200), np.ones(200), color=COLOURS[1], linewidth=1.2)
@@ -119,7 +119,7 @@ def _directions(axes: Any, found: FibreStatistics) -> None:
 
 
 def _histogram(axes: Axes, values: Float, weights: Float, label: str) -> None:
-    """Shares of the fibres, each with its weight."""
+    """Draw a histogram of the fibres, each with its weight."""
     middle, width = float(np.mean(values)) if len(values) else 0.0, float(np.ptp(values)) if len(values) else 0.0
     least = 0.01 * middle or 0.01  # equal values fill one bar
     limits = (middle - least, middle + least) if width < least else None

@@ -4,9 +4,9 @@
 
 Plane stress, 40 % of fibres, contact after debonding.  Each curve is for one pair of strengths R^n, R^t, tractions in
 GPa.  Thick: the strain only rises, so the stress drops where bonds break; thin: all equilibria, snap-back included.
-After its first drop a curve depends on the mesh: the mesh is in the title, compare others with --mesh-size.
-The paper prints curves, no numbers: the strain and the stress at onset are compared with those of a finer
-bonded cell, mesh_size = 0.1, refine = 3, order = 2, extrapolated.
+After its first drop a curve depends on the mesh: the mesh is in the title, compare others with --mesh-size.  The paper
+prints curves, no numbers: the driver compares strain and stress at onset with a finer bonded cell, mesh_size = 0.1,
+refine = 3, order = 2, extrapolated.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def drop(normal: float, tangential: float, result: Result) -> str:
-    """Onset, what is left after the first drop under rising strain, and the end."""
+    """Return the onset, the state after the first drop under rising strain, and the end."""
     points = result.path or ()
     onset, end = points[0], points[-1]
     # At the load of the first break, on the branch of the next point at a load as large.
@@ -60,7 +60,7 @@ def drop(normal: float, tangential: float, result: Result) -> str:
 
 
 def write(folder: Path, curves: dict[tuple[float, float], Result]) -> list[Path]:
-    """stress_strain.csv and stress_strain.png."""
+    """Write stress_strain.csv and stress_strain.png."""
     from matplotlib.figure import Figure
 
     print(HEADS)

@@ -1,4 +1,4 @@
-"""Parts that the drivers that are sweeps share: options, sections, and the way from cases to tables and pictures."""
+"""Shared parts of the sweep drivers: options, sections, and the steps from cases to tables and pictures."""
 
 import argparse
 from collections.abc import Callable
@@ -14,7 +14,7 @@ STIFFNESS = {"material": EQUATION_38, "analysis": {"type": "stiffness", "plane":
 
 
 def parser(description: str, name: str) -> argparse.ArgumentParser:
-    """Return the options that they all have; results go to results/`name` by default."""
+    """Return the common options; results go to results/`name` by default."""
     options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     options.add_argument("--refine", type=int, default=0, help="times that every element is cut in four")

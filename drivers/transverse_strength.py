@@ -1,12 +1,12 @@
-"""Transverse strength of a glass/epoxy ply: cells of random fibres that debond by energy, and how far they scatter.
+"""Transverse strength of a glass/epoxy ply and its scatter: cells of random fibres that debond by energy.
 
     mpirun -n 2 .venv/bin/python drivers/transverse_strength.py --out results/transverse_strength
 
-Each seed is another arrangement of 50 fibres of 7.5 um, 50 %, plane strain, strained along 1 alone.  Springs of 2025
-and 506.25 MPa/um, toughness 2 J/m2; where debonding has begun bonds break by what that releases, so that elements of
-0.8 um on the interface are fine enough.  `--law bilinear` has springs of 1e4 MPa/um instead, strengths of 50 and
-70.71 MPa in opening and shear and toughnesses of 2 and 4 J/m2, with a process zone of three such elements; the first
-break is then that of a tooth.  The matrix stays elastic: the peak is that of debonding.
+Each seed is another arrangement of 50 fibres of 7.5 um, 50 %, plane strain, strained along 1 alone.  Springs have 2025
+and 506.25 MPa/um, toughness 2 J/m2.  Where debonding has begun, bonds break by the released energy, so elements of 0.8
+um on the interface are fine enough.  `--law bilinear` has springs of 1e4 MPa/um instead, strengths of 50 and 70.71 MPa
+in opening and shear and toughnesses of 2 and 4 J/m2, with a process zone of three such elements; the first break is
+then the first tooth.  The matrix stays elastic, so debonding determines the peak.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, seed: int) -> Result:
 
 
 def row(result: Result) -> list[float]:
-    """Modulus, stress of the first break, the peak under rising strain, its strain, and points of the path."""
+    """Return C11, stress of the first break, peak under rising strain, strain at the peak, and number of points."""
     points, peak = result.path or (), result.peak
     assert peak is not None
     first = points[0]
@@ -85,7 +85,7 @@ def row(result: Result) -> list[float]:
 
 
 def write(folder: Path, found: dict[int, Result]) -> list[Path]:
-    """transverse_strength.csv and transverse_strength.png."""
+    """Write transverse_strength.csv and transverse_strength.png."""
     from matplotlib.figure import Figure
 
     rows = [[seed, *row(result)] for seed, result in found.items()]

@@ -2,9 +2,9 @@
 
     mpirun -n 2 .venv/bin/python drivers/voids.py --out results/voids
 
-Glass in epoxy in plane strain; the same fibre fraction with more and more voids half as large as the fibres.  The plane
-bulk and shear moduli stand beside those of T. Mori and K. Tanaka (Y. Benveniste, Mech. Mater. 6, 1987, 147), with
-fibres and voids in the matrix; onset is the stress S11 alone at which the first bond breaks.
+Glass in epoxy in plane strain; the same fibre fraction with more and more voids half as large as the fibres. The table
+compares the plane bulk and shear moduli with T. Mori and K. Tanaka (Y. Benveniste, Mech. Mater. 6, 1987, 147), for
+fibres and voids in the matrix. Onset is the stress S11, applied alone, at which the first bond breaks.
 """
 
 import argparse
@@ -26,7 +26,7 @@ HEAD = ("porosity", "K", "K spread", "K Mori-Tanaka", "G", "G spread", "G Mori-T
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """All porosities; print, write and draw."""
+    """Solve all porosities; print, write and draw."""
     shares = [0.0, 0.05] if given.quick else [0.0, 0.01, 0.02, 0.04, 0.06, 0.08, 0.1]
     figures.finish(comm, write, given.out, [row(given, comm, share) for share in shares])
 
@@ -55,7 +55,7 @@ def row(given: argparse.Namespace, comm: Intracomm, share: float) -> list[float]
 def solved(
     given: argparse.Namespace, comm: Intracomm, share: float, seed: int, analysis: str, **sections: Any
 ) -> Result:
-    """One analysis of one cell, in a folder of its own."""
+    """Return the result of one analysis of one cell, in a separate folder."""
     name = f"{analysis}-{share:g}-{seed}"
     document = {
         "name": name,
@@ -72,7 +72,7 @@ def solved(
 
 
 def mori_tanaka(porosity: float) -> tuple[float, float]:
-    """Plane bulk and shear moduli, sum of c M A / sum of c A over matrix, fibres and voids.
+    """Return the plane bulk and shear moduli, sum of c M A / sum of c A over matrix, fibres and voids.
 
     A = (M_0 + m) / (M + m) is the strain of a cylinder of modulus M in the matrix, with m = G_0 for K, and
     K_0 G_0 / (K_0 + 2 G_0) for G.
@@ -88,13 +88,13 @@ def mori_tanaka(porosity: float) -> tuple[float, float]:
 
 
 def moduli(phase: dict[str, float]) -> tuple[float, float]:
-    """Plane bulk modulus lambda + G, and G."""
+    """Return the plane bulk modulus lambda + G, and G."""
     shear = phase["young"] / (2 * (1 + phase["poisson"]))
     return shear / (1 - 2 * phase["poisson"]), shear
 
 
 def write(folder: Path, rows: list[list[float]]) -> list[Path]:
-    """voids.csv and voids.png."""
+    """Write voids.csv and voids.png."""
     from matplotlib.figure import Figure
 
     print(f"fibre fraction {FRACTION:g}; GPa")

@@ -2,7 +2,7 @@
 
     mpirun -n 2 .venv/bin/python drivers/window_size.py --out results/window_size
 
-Both close in on the stiffness of the periodic cell, with the width of the layer at the sides over that of the window.
+Both bounds approach the stiffness of the periodic cell as (width of the layer at the sides) / (width of the window).
 The meshes, made by gmsh, need not match on opposite sides.
 """
 

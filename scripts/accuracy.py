@@ -1,9 +1,9 @@
 """Cost of an accurate L^ef: this program on one rank against a monolithic direct solve of the same mesh.
 
-For each error the coarsest mesh of a ladder that reaches it, with linear and with quadratic elements.  Both sides
-get the same meshing, refinement and element assembly, which are timed apart ("mesh"); then "FETI" is factorization,
-preconditioner and the three load cases, "direct" the periodic gluing, one factorization by CHOLMOD through PETSc
-and three solves.  The best of several repetitions counts.
+The table lists, for each error, the coarsest mesh of a ladder that reaches the error, with linear and with quadratic
+elements.  Meshing, refinement and element assembly are common to both solvers and timed apart ("mesh"). "FETI" is
+factorization, preconditioner and three load cases; "direct" is the periodic gluing, one factorization by CHOLMOD
+through PETSc and three solves.  The best of several repetitions counts.
 """
 
 import argparse
@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def ladder() -> Iterator[tuple[float, int]]:
-    """Mesh sizes and refinements, the coarsest meshes first."""
+    """Return mesh sizes and refinements, the coarsest meshes first."""
     return iter(sorted(product(SIZES, range(7)), key=lambda rung: 4 ** rung[1] / rung[0] ** 2))
 
 
@@ -105,7 +105,7 @@ def row(geometry: str, order: int, target: float, repeat: int) -> Row:
 
 
 def measure(geometry: str, order: int, mesh_size: float, refine: int) -> tuple[int, float, float, tuple[float, ...]]:
-    """Degrees of freedom, error of L^ef, its difference to the direct solve, seconds of mesh, FETI, direct solve."""
+    """Return dofs, error of L^ef, difference from the direct solve, and seconds of mesh, FETI, direct solve."""
     comm = MPI.COMM_WORLD
     cell = {"geometry": geometry, "fibre_fraction": 0.4, "mesh_size": mesh_size, "refine": refine, "order": order}
     case = cases.parse({"cell": cell} | STIFFNESS, Path())
@@ -128,7 +128,7 @@ def measure(geometry: str, order: int, mesh_size: float, refine: int) -> tuple[i
 
 
 def direct_solve(cell: TornCell) -> tuple[float, np.ndarray, int]:
-    """Seconds, L^ef and degrees of freedom of the direct solve."""
+    """Return seconds, L^ef and degrees of freedom of the direct solve."""
     start = time.perf_counter()
     K, Q = glued(cell)
     solver = DirectSolver(K, "mono_")

@@ -1,11 +1,11 @@
 """This program against other solvers, on the same mesh and with the same tolerance.
 
-Each tool is an MPI job of its own that meshes, tears, refines and assembles the case with this program's functions
-("mesh", "assemble": the same for all) and then goes its own way: the others glue the subdomains to one periodic
-matrix ("glue"), set up and solve for one to three unit strains; direct solvers for all at once.  In generalized plane
-strain there are six, and a temperature if all phases expand; each tool has a matrix of the displacements in the plane
-and one of those along the fibres, and solves the same cell in plane strain, too.  A tool may be followed by @ and its
-number of ranks.  Memory is the largest resident memory of each rank, summed over ranks.
+Each tool runs as a separate MPI job.  All tools mesh, tear, refine and assemble the case with this program's functions
+("mesh", "assemble").  The peers then glue the subdomains to one periodic matrix ("glue"), set up and solve for one to
+three unit strains, direct solvers for all strains at once.  Generalized plane strain has six strains, and a temperature
+if all phases expand; each tool has one matrix for displacements in the plane and one for displacements along the
+fibres, and also solves the same cell in plane strain.  TOOL@N runs a tool on N ranks.  Memory is the largest resident
+memory of each rank, summed over ranks.
 """
 
 import argparse
@@ -27,7 +27,7 @@ TOOLS = "feti,cholmod,mumps@1,mumps,gamg,hypre,hypre_rigid,fetidp,bddc"
 
 
 def main() -> int:
-    """Run the tools in turns; print and write what they took."""
+    """Run the tools in turns; print and write their times and memory."""
     parser = _parser()
     arguments = parser.parse_args()
     if arguments.table:
@@ -80,11 +80,11 @@ def _tools(text: str) -> str:
 
 
 def best(arguments: argparse.Namespace, planes: Sequence[str]) -> dict[tuple[str, str], Row]:
-    """Return the fastest run of each tool in each plane state, or one that did not end well.
+    """Return the fastest run of each tool in each plane state, or its first failed run.
 
-    After such a run the tool gets no other.
+    After a failed run the tool does not run again.
 
-    The tools take turns, so that none has the quiet minutes of a machine to itself.
+    The tools take turns, so that no tool has the quiet minutes of the machine to itself.
     """
     rows: dict[tuple[str, str], Row] = {}
     turns = [(spec, plane) for spec in arguments.tools.split(",") for plane in planes]
@@ -100,7 +100,7 @@ def best(arguments: argparse.Namespace, planes: Sequence[str]) -> dict[tuple[str
 
 
 def run(tool: str, ranks: int, plane: str, arguments: argparse.Namespace) -> Row:
-    """One run of a tool."""
+    """Run a tool once."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         words = [HERE / "benchmark_tool.py", tool, arguments.case, report, "--plane", plane, "--rtol", arguments.rtol]
@@ -114,7 +114,7 @@ def run(tool: str, ranks: int, plane: str, arguments: argparse.Namespace) -> Row
 
 
 def job(ranks: int, words: Sequence[object], timeout: float) -> str:
-    """Run a Python script with its arguments as an MPI job of its own; why it failed, empty if it did not."""
+    """Run a Python script with arguments as a separate MPI job; return the reason of a failure, else ""."""
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, *map(str, words)]
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(command, stdout=output, stderr=output)
@@ -129,7 +129,7 @@ def job(ranks: int, words: Sequence[object], timeout: float) -> str:
 
 
 def _reason(words: str) -> str:
-    """Return the last line that reports an error, empty if there is none."""
+    """Return the last line that reports an error, or ""."""
     lines = [line.strip() for line in words.splitlines() if "rror" in line and "mpirun" not in line]
     return lines[-1] if lines else ""
 

@@ -1,7 +1,7 @@
 """Time of a debonding event against a monolithic factor-and-solve of the same mesh, on one rank.
 
-The hexagonal cell of the paper debonds under E = [0.2, 0, 0] in plane stress.  An event is all that it takes to go
-from one break to the next: contact states, projected Krylov solves, coarse factorizations, stresses.
+The hexagonal cell of the paper debonds under E = [0.2, 0, 0] in plane stress.  An event is all work from one break to
+the next: contact states, projected Krylov solves, coarse factorizations, stresses.
 """
 
 import argparse
@@ -42,9 +42,9 @@ PEER_RUNS = 3  # the median of so many
 
 
 class Measured(NamedTuple):
-    """A path: the torn cell, dofs when glued, and seconds.
+    """A path: the torn cell, degrees of freedom of the glued cell, and seconds.
 
-    Of the set-up, of each event, and of the peer's factorization and solve.
+    The seconds belong to the set-up, each event, and the peer's factorization and solve.
     """
 
     cell: TornCell
@@ -59,12 +59,12 @@ class Measured(NamedTuple):
 
     @property
     def ratios(self) -> tuple[float, float]:
-        """The peer's seconds over those of an event, of the mean and of the worst."""
+        """The peer's seconds / seconds of the mean event, and of the worst event."""
         return sum(self.peer) / float(np.mean(self.events)), sum(self.peer) / max(self.events)
 
 
 class Row(NamedTuple):
-    """A whole path of a table, and what is asked of it: the peer over a mean event, and seconds of the worst."""
+    """A whole path of a table with its targets: peer / mean event, and seconds of the worst event."""
 
     fibres: int
     refine: int
@@ -114,7 +114,7 @@ def main() -> None:
 
 
 def print_table(arguments: argparse.Namespace) -> None:
-    """Print the medians of whole paths, repeated in turns, beside what is asked of them."""
+    """Print the medians of whole paths, repeated in turns, beside their targets."""
     rows, found = TABLES[arguments.table], list[list[Measured]]()
     for _ in range(arguments.repeat):
         found.append([])
@@ -168,7 +168,7 @@ def document(arguments: argparse.Namespace) -> dict[str, Any]:
 def run_events(
     homogenization: Homogenization, count: int | None, clock: Callable[[], float] = time.perf_counter
 ) -> tuple[list[float], list[int], list[int]]:
-    """Seconds, Krylov iterations and dual problems of each of the first `count` events, of all if None."""
+    """Return seconds, Krylov iterations and dual problems of each of the first `count` events; None means all."""
     interface = homogenization.interface
     n = len(interface.nodes.row)
     bonds = BondState(np.full(n, BONDED, np.int8), np.zeros((n, 0)), np.zeros(n, bool))

@@ -21,12 +21,12 @@ WRONG = 1e-4
 
 @dataclass
 class Row:
-    """Cost of a tool: seconds of each stage, iterations of each load (none of a direct solver), MB.
+    """Cost of a tool: seconds of each stage, iterations of each load (none for a direct solver), MB.
 
     Attributes:
         plane: the plane state.
-        stresses: a column for each unit strain and, behind them, for a unit of temperature.
-        difference: of these columns, the largest of one relative to the largest entry of it.
+        stresses: a column for each unit strain, then one for a unit temperature.
+        difference: largest difference of a column, relative to the largest entry of the column.
     """
 
     tool: str
@@ -63,7 +63,7 @@ class Row:
 
 
 def compare(rows: Sequence[Row]) -> None:
-    """Fill in `difference` to the first direct solver of the same plane state that is done, or else to the first tool.
+    """Fill in `difference` from the first finished direct solver of the same plane state, or else from the first tool.
 
     Mark wrong results.
     """
@@ -80,7 +80,7 @@ def compare(rows: Sequence[Row]) -> None:
 
 
 def table(rows: Sequence[Row]) -> list[str]:
-    """Aligned lines; the ratios are this program's to each tool's, of the same plane state."""
+    """Return aligned lines; ratios are this program / tool, in the same plane state."""
     lines = [
         f"{'':47}{'seconds':^50}{'':14}{'':9}  feti / tool",
         f"{'tool@ranks':14}{'dofs':>9}{'domains':>9}  {'plane':<12}{'loads':>5}" + "".join(f"{s:>9}" for s in STAGES)
@@ -120,7 +120,7 @@ def notes(rows: Sequence[Row]) -> list[str]:
 
 
 def pairs(rows: Sequence[Row]) -> list[str]:
-    """For each tool that two plane states have: this program's time over its own in both, set-up and solves."""
+    """List, for each tool in two plane states, this program's time / the tool's time of set-up and solves."""
     lines = []
     for name in dict.fromkeys(row.name for row in rows if row.tool in PEERS):
         found = [

@@ -16,7 +16,7 @@ Runner = Callable[[str, int, str, argparse.Namespace], Row]
 
 
 class Compared(NamedTuple):
-    """A cell, how many ranks this program and a direct solver get, and the ratio of times that is aimed at."""
+    """A cell, the ranks of this program and of a direct solver, and the target of the time ratio."""
 
     case: str
     ranks: int
@@ -41,7 +41,7 @@ COMPARED = (
 
 
 def compare(arguments: argparse.Namespace, run: Runner) -> int:
-    """Run both tools of each comparison in turns; print the medians of their whole times.  0 if all are done."""
+    """Run both tools of each comparison in turns; print the medians of total times; return 0 if all finish."""
     print(f"{'cell':28}{'dofs':>8}{'domains':>9}{'feti':>12}{'peer':>14}{'ratio':>8}{'aim':>6}")
     failed = 0
     with tempfile.TemporaryDirectory() as folder:

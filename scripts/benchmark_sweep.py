@@ -1,7 +1,7 @@
-"""Time of a sweep on one rank and with one case on each rank, and of a loop of the same meshes over CHOLMOD.
+"""Time of a sweep on one rank, of a sweep with one case per rank, and of a CHOLMOD loop over the same meshes.
 
-All are whole commands, start-up included, run in turns. The loop only meshes, assembles, factors and solves: it writes
-nothing and estimates no errors. The processor's time, which other programs change least, is that of all ranks.
+All three are whole commands, start-up included, run in turns. The loop only meshes, assembles, factors and solves: it
+writes nothing and estimates no errors. Processor time, which other programs change least, is summed over all ranks.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def seconds(path: Path, out: Path, ranks: int | None) -> tuple[float, float]:
-    """Return wall and processor time of the sweep on so many ranks, of the loop for None."""
+    """Return wall and processor time of the sweep on `ranks` ranks, or of the loop if None."""
     words = [sys.executable, __file__, "--loop", path]
     if ranks is not None:
         words = [sys.executable, "-m", "feti_homog", "sweep", path, "--out", out, "--ranks-per-case", "1", "--quiet"]

@@ -1,8 +1,8 @@
 """One tool of the benchmark in an MPI job of its own: mesh, assemble, set up, solve, and report.
 
-Every tool begins with the same meshing, tearing, refining and assembling.  In generalized plane strain each solves the
-problem of the plane and the one along the fibres, which share nothing, for all their loads.  Options with the prefix
-`peer_` in the environment's PETSC_OPTIONS go before those of the peer.
+Every tool begins with the same meshing, tearing, refining and assembling.  In generalized plane strain each tool solves
+the uncoupled problems in the plane and along the fibres for all their loads.  Options with the prefix `peer_` in
+PETSC_OPTIONS win over the peer's own options.
 """
 
 import argparse
@@ -87,7 +87,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
 
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
-    """Run another tool; its second problem begins when the matrices of the first are gone."""
+    """Run another tool; its second problem begins after the matrices of the first problem are freed."""
     comm = progress.comm
     own, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress, BY_COST)
     with progress.stage("glue"):
@@ -116,7 +116,7 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
 
 
 def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:
-    """Return the matrix in the peer's type, with the rigid-body modes if it wants them; that of `cell` may be freed."""
+    """Return the matrix in the peer's type, with rigid-body modes if used; may free the matrix of `cell`."""
     A, modes = cell.A, cell.rigid() if tool.rigid else None
     if tool.matrix != "is":
         A = cell.A.convert(tool.matrix, PETSc.Mat())
@@ -128,7 +128,7 @@ def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:
 
 
 def _solver(tool: Peer, A: PETSc.Mat, rtol: float) -> PETSc.KSP:
-    """Return the KSP of a matrix, set up."""
+    """Return a KSP for a matrix, set up."""
     database = PETSc.Options(PREFIX)
     for name, value in tool.options.items():
         if not database.hasName(name):
@@ -151,7 +151,7 @@ class _Solved(NamedTuple):
 
 
 def _solved_in_turn(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
-    """Each load by itself."""
+    """Solve for one load after the other."""
     solved = _Solved([], [], [])
     for load in loads:
         u = load.duplicate()
@@ -163,7 +163,7 @@ def _solved_in_turn(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
 
 
 def _solved_together(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
-    """All loads at once, as a factor solves for them fastest; there are no iterations."""
+    """Solve for all loads at once, which is fastest with a factor; there are no iterations."""
     size = ((loads[0].getLocalSize(), None), (None, len(loads)))
     right = PETSc.Mat().createDense(size, comm=ksp.comm)
     right.setUp()
@@ -194,7 +194,7 @@ def _report(
 
 
 def peak() -> float:
-    """Largest resident memory of this rank so far in megabytes."""
+    """Return the largest resident memory of this rank so far, in megabytes."""
     return process_memory.peak() / MEGABYTE
 
 

@@ -1,7 +1,7 @@
-"""Print the test files that a change touches: those changed, and those that import a changed module.
+"""Print the test files that a change touches: changed files, and files that import a changed module.
 
 `.venv/bin/python scripts/changed_tests.py [COMMIT]` takes the changes since COMMIT, by default HEAD~1, and new files.
-Modules of `tests/` that are not tests pass a change on to whatever imports them.
+Modules of `tests/` that are no tests pass a change on to all files that import them.
 """
 
 import ast
@@ -14,7 +14,7 @@ ON_PATH = ("tests/", "scripts/", "drivers/", "")  # as pytest has it
 
 
 def changed(commit: str) -> set[str]:
-    """Return the paths of the files that differ from a commit, and of new ones."""
+    """Return the paths of new files and of files that differ from a commit."""
     differ = ["git", "diff", "--name-only", commit], ["git", "ls-files", "--others", "--exclude-standard"]
     listed = (subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout for words in differ)
     return {name for text in listed for name in text.splitlines()}
@@ -38,7 +38,7 @@ def imports(path: Path) -> set[str]:
 
 
 def touched(files: set[str]) -> list[str]:
-    """Return the test files that are among changed files, or import one of them, even through other test modules."""
+    """Return the changed test files, and those that import a changed file, even through other test modules."""
     of_tests = {path.relative_to(ROOT).as_posix(): imports(path) for path in sorted((ROOT / "tests").rglob("*.py"))}
     found = files & of_tests.keys()
     modules = {module_name(name) for name in files if name.endswith(".py")}

@@ -1,6 +1,6 @@
-"""Check that every module that feti_homog needs is there and fit for use; names what is missing, exit code 1.
+"""Check that every module that feti_homog needs can be used; name missing modules and end with exit code 1.
 
-With --quick, only that the modules are found, without importing them. With --versions, print the versions found.
+With --quick, only look for the modules, without importing them. With --versions, print the versions found.
 """
 
 import importlib
@@ -52,7 +52,7 @@ DEMANDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def fault_found(module: str) -> str:
-    """Empty if the module's package is on the path, else the reason (nothing is imported)."""
+    """Return why the package of a module is not on the path, or ""; import nothing."""
     if not importlib.util.find_spec(module.split(".")[0]):
         return "not found"
     constraints = Path(sys.prefix) / "constraints.txt"
@@ -62,14 +62,14 @@ def fault_found(module: str) -> str:
 
 
 def numpy_fault(constraint: str, installed: str) -> str:
-    """Empty if the NumPy that is installed is of the major version of a constraint such as numpy==1.26.4."""
+    """Return why the installed NumPy has not the major version of a constraint such as numpy==1.26.4, or ""."""
     wanted = constraint.strip().partition("==")[2]
     same = wanted.split(".")[0] == installed.split(".")[0]
     return "" if same else f"version {installed}: petsc4py was built for {wanted}"
 
 
 def fault_imported(module: str) -> str:
-    """Empty if the module can be imported and fulfils its demand, else the reason."""
+    """Return why the module cannot be imported or lacks a required feature, or ""."""
     try:
         imported = importlib.import_module(module)
     except Exception as error:  # a broken module may raise anything

@@ -1,4 +1,4 @@
-"""Calls that communicate: those that Python makes by mpi4py counted, and any refused where none may be."""
+"""Count the communicating calls that Python makes by mpi4py; refuse communication in guarded sections."""
 
 import contextlib
 import sys
@@ -28,9 +28,9 @@ class CommunicationError(AssertionError):
 
 @contextmanager
 def collective_calls() -> Iterator[Counter[str]]:
-    """Provide calls of this rank in the block, by name, without those that PETSc and MUMPS make themselves.
+    """Provide the calls of this rank in the block, by name; calls inside PETSc and MUMPS do not count.
 
-    The block gets slower: no time of it is worth anything.
+    The block gets slower, so its times mean nothing.
     """
     calls: Counter[str] = Counter()
 
@@ -46,8 +46,8 @@ def collective_calls() -> Iterator[Counter[str]]:
 def no_communication() -> Iterator[None]:
     """Provide a block in which communication raises CommunicationError.
 
-    mpi4py, PETSc's objects and HDF5's files of several ranks raise it before they communicate, or after PETSc has made
-    such an object.
+    mpi4py, and PETSc objects and HDF5 files of several ranks, raise it before they communicate; creating such a PETSc
+    object raises it afterwards.
     """
 
     def refuse(frame: FrameType, event: str, function: Any) -> None:
@@ -82,7 +82,7 @@ def _is_of_ranks(function: Any) -> bool:
 
 
 def _is_shared_file(frame: FrameType) -> bool:
-    """Return True if a function of h5py that begins opens a file for several ranks, or works on one."""
+    """Return True if a starting h5py function opens or uses a file of several ranks."""
     if not frame.f_globals.get("__name__", "").startswith("h5py."):
         return False
     values = frame.f_locals

@@ -1,9 +1,9 @@
-"""Count how often the intervals of fits cover the truth, of the four composites to their constants with noise.
+"""Count how often the intervals of fits to noisy constants of four composites cover the true values.
 
     .venv/bin/python scripts/fit_coverage.py --trials 200
 
 Each trial adds independent errors of 1 % to the eight constants of a composite, and fits the constants of its phases
-from them, as `feti-homog fit` does; the intervals should cover the truth in 95 +- 3 % of the trials.
+from them, as `feti-homog fit` does; the intervals should cover the true values in 95 +- 3 % of the trials.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 class _Trials:
-    """Trials of one composite; of a carbon fibre without nu_axial, which 1 % of noise leaves open."""
+    """Trials of one composite; for carbon fibres without nu_axial, which data with 1 % noise do not determine."""
 
     def __init__(self, name: str, noise: float, comm: Any) -> None:
         truth, self.noise = composites.truth(name), noise
@@ -63,7 +63,7 @@ class _Trials:
         self.values = computed(self.truth)[0]
 
     def run(self, trial: int) -> tuple[Any, int]:
-        """Return for each unknown whether its interval covers the truth, and the number of evaluations."""
+        """Return for each unknown whether its interval covers the true value, and the number of evaluations."""
         std = self.noise * np.abs(self.values)
         y = self.values + std * np.random.default_rng(trial).normal(size=len(std))
         known: dict[tuple[float, ...], Any] = {}

@@ -1,7 +1,7 @@
-"""The bonded cell glued together again, as solvers of one global matrix take it: distributed, periodic, pinned.
+"""Glue the bonded cell together again for solvers of one global matrix: distributed, periodic, pinned.
 
-A fine node on the torus is a vertex class, a place on a torus edge, or inside a coarse triangle, so its number
-follows from coarse numbers alone.
+A fine node on the torus is a vertex class, a place on a torus edge, or a place inside a coarse triangle, so coarse
+numbers alone give its number.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Nodes:
 
     Attributes:
         local: for each subdomain, (c,) number on this rank of each of its classes.
-        number: (n,) global number; those that a rank owns follow each other.
+        number: (n,) global number; the numbers that a rank owns are contiguous.
         owned: (n,) whether this rank owns it.
     """
 
@@ -37,7 +37,7 @@ class Nodes:
 
     @classmethod
     def of(cls, comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> Nodes:
-        """Assign numbers to the nodes; one that several ranks hold is owned by the lowest of them.  Collective."""
+        """Assign numbers to the nodes; the lowest rank that holds a node owns it.  Collective."""
         keys, several = _keys(comm, subdomains, lattice)
         sizes = np.cumsum([len(k) for k in keys])[:-1]
         unique, first, which = np.unique(np.concatenate(keys), return_index=True, return_inverse=True)
@@ -62,9 +62,9 @@ class Nodes:
 
 
 def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> tuple[list[Int], int]:
-    """Return a key for each class of each subdomain, and from which on keys are not shared.
+    """Return a key for each class of each subdomain, and the first key that is not shared.
 
-    A key is the same wherever the node is.
+    A node has the same key in all subdomains.
     """
     inner = lattice.intervals - 1
     inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
@@ -91,11 +91,11 @@ def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLa
 
 @dataclass(frozen=True)
 class Glued:
-    """A u = -Q E on all ranks, the pinned class held by its diagonal.
+    """The system A u = -Q E on all ranks; the diagonal of A holds the pinned class.
 
     Attributes:
         A: MATIS, with the sum of a rank's subdomains as its local matrix.
-        Q: for each of the v unit loads its vector.
+        Q: a vector for each of the v unit loads.
         stiffness: (v, v) sum |Omega_s| L_s of all subdomains.
         points: (owned nodes, 2) where they are in the plane.
         problem: the displacements and the unit loads.
@@ -108,7 +108,7 @@ class Glued:
     problem: Problem
 
     def rigid(self) -> PETSc.NullSpace:
-        """Return the translations, and in the plane a rotation, which leaps where the cell's sides meet.
+        """Return the orthonormal translations and, in the plane, a rotation, which jumps at the cell's sides.
 
         Orthonormal.
         """
@@ -125,12 +125,12 @@ class Glued:
         return PETSc.NullSpace().create(vectors=modes, comm=self.A.comm)
 
     def stress(self, u: PETSc.Vec) -> Float:
-        """(v,) int sigma of the fluctuation alone, to which `stiffness` times the unit load adds."""
+        """Return int sigma (v,) of the fluctuation alone, without `stiffness` times the unit load."""
         return np.array([q.dot(u) for q in self.Q])
 
 
 def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], nodes: Nodes) -> Glued:
-    """Glue the subdomains, which are taken from the list one by one to save memory.  Collective."""
+    """Glue the subdomains; take them from the list one by one to save memory.  Collective."""
     problem, n = subdomains[0].problem, len(nodes.number)
     c, loads = problem.components, range(len(problem.loads))
     entries, Q, x = np.zeros(c * n, np.int32), np.zeros((c * n, len(loads))), np.zeros((n, 2))

@@ -2,9 +2,9 @@
 
     .venv/bin/python scripts/measure_accuracy.py
 
-For each cell and each refinement of its coarsest mesh the largest relative error of the strain energy and, in brackets,
-that error relative to the estimate of `feti_homog.case.cell_sizes`, which is to be at most about 2/3. The exact
-stiffness is that of quadratic elements after one refinement more, which err 16 times less.
+Prints, for each cell and each refinement of its coarsest mesh, the largest relative error of the strain energy and, in
+brackets, this error / the estimate of `feti_homog.case.cell_sizes`, which should be at most about 2/3. Quadratic
+elements refined once more, with errors 16 times smaller, give the exact stiffness.
 """
 
 import argparse
@@ -25,7 +25,7 @@ POISSON_RATIOS = (0.2, 0.45, 0.48, 0.49, 0.4999, 0.499999)
 
 
 def cells() -> list[tuple[str, dict[str, Any], float, float]]:
-    """Name, cell, contrast of Young's moduli, Poisson's ratio of the matrix."""
+    """Return name, cell, contrast of Young's moduli, Poisson's ratio of the matrix."""
     shapes = {f"square {f}": {"geometry": "square", "fibre_fraction": f} for f in (0.2, 0.4, 0.6)}
     shapes |= {f"hexagonal {f}": {"geometry": "hexagonal", "fibre_fraction": f} for f in (0.4, 0.7, 0.85)}
     shapes |= {
@@ -37,7 +37,7 @@ def cells() -> list[tuple[str, dict[str, Any], float, float]]:
 
 
 def main() -> None:
-    """One line a cell."""
+    """Print one line per cell."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
     wanted = parser.parse_args().only
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def measured(cell: dict[str, Any], contrast: float, poisson: float) -> dict[int, tuple[list[float], list[float]]]:
-    """Return the errors of the ladder, and their shares of the estimate, by the order of elements."""
+    """Return the errors of the ladder and their ratios to the estimate, by the order of elements."""
     phases = {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": contrast, "poisson": 0.22}}
     document = {"material": phases, "analysis": {"type": "stiffness", "plane": "strain"}}
     coarse = Case.parse(document | {"cell": cell | {"accuracy": 0.1}})
@@ -80,7 +80,7 @@ def measured(cell: dict[str, Any], contrast: float, poisson: float) -> dict[int,
 
 
 def energy_error(stiffness: Float, exact: Float) -> float:
-    """max |E . (L - exact) E| / (E . exact E) over the strains E."""
+    """Return max |E . (L - exact) E| / (E . exact E) over the strains E."""
     return float(np.abs(eigh(stiffness - exact, exact, eigvals_only=True)).max())
 
 

@@ -2,8 +2,8 @@
 
     .venv/bin/python scripts/measure_cost.py
 
-Each kind of cell is refined several times; the constants make the logarithms of estimates and measurements agree best,
-so that twice as much is as far off as half.
+Each kind of cell is refined several times. The constants fit the logarithms of the estimates to the measurements, so
+that twice as much is as wrong as half.
 """
 
 import subprocess
@@ -37,7 +37,7 @@ COATING = {"young": 20.0, "poisson": 0.3}
 
 
 def main() -> None:
-    """Run the cases, with fields, each in a process of its own, and fit."""
+    """Run the cases, with fields, each in a separate process, and fit."""
     runs = [document(cell, refine) for cell in CELLS for refine in REFINEMENTS]
     coated = [document(cell, refine) for cell in COATED for refine in OF_COATED]
     for names, (constants, ratios) in (memory_fit(runs, coated) | factor_fit()).items():
@@ -47,9 +47,9 @@ def main() -> None:
 
 
 def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
-    """Fit the memory of all runs by twice the nodes of their meshes, and of coated ones by their influence columns.
+    """Fit the memory of all runs by twice the mesh nodes, and of coated cells by their influence columns.
 
-    By the names of constants, as `partition_policy` has them: values, and estimates over measurements.
+    Returns, by the names of the constants in `partition_policy`, values and estimates / measurements.
     """
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in [*runs, *coated]]).T
     columns = np.array([*(0 for _ in runs), *(run["solver"]["multipliers"] for run in coated)])
@@ -57,7 +57,7 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
 
 
 def factor_fit() -> dict[str, tuple[Any, Any]]:
-    """Fit the memory that a cell of one factor takes beyond the other constants, as they are now."""
+    """Fit the memory of a cell of one factor, less the memory by the present other constants."""
     runs = [document(cell, refine, {}) for cell in CELLS for refine in OF_ONE_FACTOR]
     runs = [run for run in runs if run["solver"]["subdomains"] == 1]
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T
@@ -69,7 +69,7 @@ def factor_fit() -> dict[str, tuple[Any, Any]]:
 
 
 def document(cell: dict[str, Any], refine: int, decomposition: Any = BODIES) -> dict[str, Any]:
-    """result.json of one run with these sections."""
+    """Return result.json of one run with these sections."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
         materials = STIFFNESS["material"] | ({"coating": COATING} if "coating" in cell else {})
@@ -81,7 +81,7 @@ def document(cell: dict[str, Any], refine: int, decomposition: Any = BODIES) -> 
 
 
 def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
-    """Positive constants with values about the sum of constant * column, and that sum over the values."""
+    """Return positive constants with values = sum of constant * column, nearly, and sum / values."""
     matrix = np.stack(columns, axis=1) / values[:, None]
     first = np.log(1.0 / np.array([np.median(column[column > 0]) for column in matrix.T]) / len(columns))
     constants = np.exp(least_squares(lambda logarithms: np.log(matrix @ np.exp(logarithms)), first).x)

@@ -1,4 +1,4 @@
-"""Measures on one rank where the dense kernels of the solver change their ways.
+"""Measures on one rank the sizes at which the solver should switch between dense kernels.
 
     .venv/bin/python scripts/measure_kernels.py [--dofs N]
 
@@ -20,7 +20,7 @@ COLUMNS = (1, 2, 3, 4, 6, 8, 12)
 
 
 def best(work: Callable[[], object], seconds: float = 0.2) -> float:
-    """Shortest time of `work` in microseconds, of as many runs as take so many seconds, three at least."""
+    """Return the shortest time of `work` in microseconds, over runs for `seconds` seconds, at least three."""
     times: list[float] = []
     while len(times) < 3 or sum(times) < seconds:
         start = perf_counter()
@@ -30,14 +30,14 @@ def best(work: Callable[[], object], seconds: float = 0.2) -> float:
 
 
 def compare(title: str, pairs: list[tuple[int, float, float]], small: str, large: str) -> None:
-    """Print the times of two ways for each size."""
+    """Print the times of two kernels for each size."""
     print(f"\n{title}\n{'size':>6}{small:>16}{large:>16}   us")
     for size, first, second in pairs:
         print(f"{size:6}{first:16.1f}{second:16.1f}")
 
 
 def dense_columns(n: int) -> list[tuple[int, float, float]]:
-    """Symmetric products with columns one after the other, and all at once."""
+    """Compare symmetric products with one column after the other and with all columns at once."""
     A, found = np.asfortranarray(np.random.default_rng(0).random((n, n))), []
     for k in COLUMNS:
         X = np.asfortranarray(np.random.default_rng(1).random((n, k)))
@@ -47,7 +47,7 @@ def dense_columns(n: int) -> list[tuple[int, float, float]]:
 
 
 def triangles() -> list[tuple[int, float, float]]:
-    """LAPACK's inverse of a triangle, and that by its two halves."""
+    """Compare LAPACK's inverse of a triangular matrix with the inverse by two halves."""
     found = []
     for n in (16, 32, 48, 64, 96, 128, 256):
         U = np.asfortranarray(np.triu(np.random.default_rng(0).random((n, n)))) + n * np.eye(n)
@@ -63,7 +63,7 @@ def triangles() -> list[tuple[int, float, float]]:
 
 
 def main() -> None:
-    """Measure all."""
+    """Measure all kernels."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dofs", type=int, default=3000, help="ten times the rows of the matrix")
     dofs = parser.parse_args().dofs

@@ -1,17 +1,17 @@
-"""Measures how good the estimated errors of the mesh are: true error / estimate, on one rank.
+"""Measures the quality of estimated mesh errors: true error / estimate, on one rank.
 
     .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--refine N] [--nested]
     .venv/bin/python scripts/measure_mesh_error.py --factors [--only WORDS] [--refine N]
 
-For each cell, each order of elements and each of three refinements the least and the largest ratio over the entries of
-the stiffness that are above 1e-3 of its largest and whose estimate is above the error of the exact value; then over
-all cells how many lie between 0.5 and 2.  Exact values are spectral (tests/reference/references.py) or of quadratic
-elements refined twice more.
+Prints, for each cell, order of elements and each of three refinements, the least and the largest ratio over the
+stiffness entries above 1e-3 of the largest entry whose estimate exceeds the error of the exact value; then the share of
+all ratios between 0.5 and 2.  Exact values are spectral (tests/reference/references.py) or come from quadratic elements
+refined twice more.
 
-`--factors` prints what `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_estimate.py hold: errors of
-elements and of arcs by the mesh itself over those by the mesh refined less, of the diagonal, cells cut by bodies and
-across materials; with quadratic elements in phases that lock also true errors, less those of arcs, over those of
-elements.
+`--factors` prints the values of `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_estimate.py: errors
+of elements and of arcs by the mesh itself / errors by the mesh refined less, for diagonal entries, in cells cut by
+bodies and across materials.  For quadratic elements in phases that lock it also prints (true error - arc error) /
+element error.
 """
 
 import argparse
@@ -77,12 +77,12 @@ def locking(poisson: float, contrast: float) -> dict[str, Any]:
 
 
 def orthotropic(C11: float, C12: float, C33: float, C22: float | None = None) -> Float:
-    """(3, 3) stiffness."""
+    """Return a stiffness (3, 3)."""
     return np.array([[C11, C12, 0.0], [C12, C11 if C22 is None else C22, 0.0], [0.0, 0.0, C33]])
 
 
 def spectral() -> list[Known]:
-    """Cells whose stiffness is known."""
+    """Return cells of known stiffness."""
     found: list[Known] = []
     for (cell, plane), known in BONDED.items():
         found.append(
@@ -109,7 +109,7 @@ def spectral() -> list[Known]:
 
 
 def twins() -> list[Known]:
-    """Cells whose stiffness a finer mesh gives."""
+    """Return cells whose stiffness comes from a finer mesh."""
     cell = {"fibres": 5, "seed": 1, "min_gap": 0.05}
     axes = ((0.3, 0.3, 0.28, 0.15, 20.0), (0.7, 0.75, 0.25, 0.18, 70.0))
     ellipses = [dict(zip(("x", "y", "a", "b", "angle"), own, strict=True)) for own in axes]
@@ -144,7 +144,7 @@ def twins() -> list[Known]:
 
 
 def ellipses_on_springs() -> dict[str, dict[str, Any]]:
-    """Ellipses of 2:1 on soft, medium and stiff springs, alike in both directions and not, and an arc on springs."""
+    """Return 2:1 ellipses on soft to stiff springs, equal and unequal in both directions, and an arc on springs."""
     pairs = ((1, 1), (10, 10), (10, 2), (2, 10), (100, 25))
     phases = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}
     fibre = {"x": 0.5, "y": 0.5, "a": 0.36, "b": 0.18, "angle": 20.0}
@@ -166,7 +166,7 @@ def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
 def ratios(
     document: dict[str, Any], exact: Float, error: float, order: int, size: float, arguments: argparse.Namespace
 ) -> Float:
-    """Ratios of true errors to their estimates, of the entries that matter and whose estimate is above `error`."""
+    """Return true error / estimate of the large entries whose estimate is above `error`."""
     mesh = {"mesh_size": size * 2**arguments.refine, "order": order}
     found, estimate = solved(document, **mesh, refine=arguments.refine)
     if arguments.nested:
@@ -176,15 +176,15 @@ def ratios(
 
 
 def orders(document: dict[str, Any]) -> list[int]:
-    """Return the orders of elements that a case may have: linear ones lock beyond 0.49."""
+    """Return the element orders for a case: linear elements lock beyond 0.49."""
     return [order for order in SIZES if order == 2 or document["material"]["matrix"]["poisson"] <= 0.49]
 
 
 def both_errors(case: Case, exact: Float | None = None) -> Iterator[tuple[str, Float]]:
-    """Yield, of each problem of a case, what the factors are of and (2, k) errors over those of the coarser mesh.
+    """Yield, for each problem of a case, the label of the factors and (2, k) errors / errors of the coarser mesh.
 
-    (3, k) with an exact stiffness in the plane: of elements, of arcs, and true errors less those of arcs over those of
-    elements.
+    The rows are elements and arcs.  An exact stiffness in the plane adds a third row: (true - arc error) / element
+    error of the coarser mesh.
     """
     cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
     context = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True))
@@ -222,7 +222,7 @@ def all_errors(
 
 
 def print_factors(arguments: argparse.Namespace) -> None:
-    """Print geometric means over all cells and meshes, and between which nine tenths lie."""
+    """Print geometric means over all cells and meshes, and the range of nine tenths of the factors."""
     found: dict[str, list[Float]] = {}
     for name, document, known, _ in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
         for words, each in all_errors(document, known, arguments):
@@ -238,7 +238,7 @@ def print_factors(arguments: argparse.Namespace) -> None:
 
 
 def print_ratios(arguments: argparse.Namespace) -> None:
-    """One line a cell and order, and the shares of all entries."""
+    """Print one line per cell and order, and the shares of all entries."""
     of_all: dict[int, list[float]] = {order: [] for order in SIZES}
     for name, document, known, error in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
         exact = solved(document, **EXACT)[0] if known is None else known
@@ -253,7 +253,7 @@ def print_ratios(arguments: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    """Print ratios, or factors."""
+    """Print ratios or factors."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
     parser.add_argument("--refine", type=int, default=1, help="halvings of coarser meshes; 0 of none")

@@ -2,10 +2,10 @@
 
     mpirun -n 2 .venv/bin/python scripts/measure_thresholds.py min_trace_dofs 40 100 250
 
-Each line is a random cell of narrow gaps, its matrix whole or in pieces, with stiff or soft fibres, and one value: the
-coarse vectors per subdomain, iterations to 1e-8 of three load cases, and seconds of meshing, set-up and solve.  For the
-figures in `thresholds.py`, with --contrasts 2: `soft_mode` --fibres 16 --refine 1 --pieces 1; `min_trace_dofs` the same
-with --refine 2; the others --fibres 36 --refine 1 --pieces 0.
+Each line is one value in a random cell of narrow gaps, with the matrix whole or in pieces and stiff or soft fibres.  It
+gives coarse vectors per subdomain, iterations of three load cases to 1e-8, and seconds of meshing, set-up and solve.
+For the figures in `thresholds.py`, with --contrasts 2: `soft_mode` --fibres 16 --refine 1 --pieces 1; `min_trace_dofs`
+the same with --refine 2; the others --fibres 36 --refine 1 --pieces 0.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def with_value(name: str, value: float) -> Thresholds:
-    """Return the defaults but for one."""
+    """Return the default thresholds with one value replaced."""
     return replace(DEFAULTS, **{name: type(getattr(DEFAULTS, name))(value)})
 
 

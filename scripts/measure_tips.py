@@ -1,7 +1,7 @@
 """Measures the gain of grading at the tips of debonded arcs.
 
-It is the largest relative error of C11, C22, C12 and C33 of the square cell with an arc of 120 degrees whose faces may
-overlap, against the degrees of freedom, on one rank.
+Prints the largest relative error of C11, C22, C12 and C33 of the square cell over the degrees of freedom, on one rank.
+The cell has an arc of 120 degrees whose faces may overlap.
 
     .venv/bin/python scripts/measure_tips.py
 
@@ -23,7 +23,7 @@ MESHES += [(2, size, refine) for size in (0.1, 0.07, 0.05) for refine in range(3
 
 
 def main() -> None:
-    """One row a mesh."""
+    """Print one row per mesh."""
     print("| order | mesh_size | refine | dofs, one size | error | dofs, graded | error |")
     print("|---|---|---|---|---|---|---|")
     for order, size, refine in MESHES:
@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def measured(order: int, size: float, refine: int, tip: float | None) -> tuple[int, float]:
-    """Degrees of freedom and error of one mesh; a `tip` of None is the default."""
+    """Return degrees of freedom and error of one mesh; a `tip` of None is the default."""
     mesh = {"order": order, "mesh_size": size, "refine": refine} | ({} if tip is None else {"tip_size": tip})
     result = run(Case.parse(STIFFNESS | {"cell": CELL | mesh, "interface": ARC}), MPI.COMM_SELF)
     L = result.effective_stiffness

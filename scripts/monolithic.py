@@ -15,7 +15,7 @@ from feti_homog.homogenization.unit_cell import TornCell
 
 
 def glued(cell: TornCell) -> tuple[csr_matrix, np.ndarray]:
-    """K and Q of the perfectly bonded cell, the subdomains (all on one rank) glued on the torus."""
+    """Return K and Q of the perfectly bonded cell, with subdomains (all on one rank) glued on the torus."""
     local = Nodes.of(cell.comm, cell.subdomains, cell.lattice).local
     dofs = (2 * np.concatenate(local)[:, None] + np.arange(2)).ravel()
     n, first = int(dofs.max()) + 1, 0
@@ -33,7 +33,7 @@ def glued(cell: TornCell) -> tuple[csr_matrix, np.ndarray]:
 def factor_and_solve(
     K: csr_matrix, loads: np.ndarray, clock: Callable[[], float] = time.perf_counter
 ) -> tuple[float, float]:
-    """Seconds to factor K, and to solve for the columns of `loads` (n, k)."""
+    """Return the seconds to factor K and to solve for the columns of `loads` (n, k)."""
     start = clock()
     solver = DirectSolver(K, "mono_")
     factored = clock()

@@ -1,7 +1,7 @@
-"""Put deliberate errors of one line into copies of the program, and list the tests that notice each of them.
+"""Put deliberate one-line errors into copies of the program, and list the tests that detect each error.
 
-`.venv/bin/python scripts/mutations.py [WORD ...]` tries those of tests/mutations.toml whose printed line has one of the
-words, or all; it ends with 1 if one survives, or if tests fail without any.
+`.venv/bin/python scripts/mutations.py [WORD ...]` tries the errors of tests/mutations.toml whose printed line has one
+of the words, or all. It ends with 1 if an error survives, or if tests fail without an error.
 """
 
 import os
@@ -26,7 +26,7 @@ PASSED, FAILED, LATE = 0, 1, (124, 137, -9)
 
 
 def copied(folder: Path) -> Path:
-    """Copy the files that git has, or would have; returns the folder."""
+    """Copy the files that git tracks or would track; return the folder."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True
     )
@@ -37,9 +37,9 @@ def copied(folder: Path) -> Path:
 
 
 def run_tests(folder: Path, tests: str, ranks: int, limit: float) -> tuple[int, list[str]]:
-    """Return the exit status of tests in a folder at this number of ranks, and the names of those that failed.
+    """Return the exit status of tests in a folder at this number of ranks, and the names of failed tests.
 
-    `tests` are pytest's or hostile ones, which have no names.
+    `tests` are pytest files or hostile cases; the latter have no names.
     """
     is_hostile = tests.startswith("hostile ")
     words = [sys.executable, "-m", *([] if is_hostile else PYTEST), *shlex.split(tests)]
@@ -60,7 +60,7 @@ def time_of(folder: Path, tests: str, ranks: int) -> float | None:
 def outcome(
     folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int, limit: float
 ) -> tuple[str, list[str]]:
-    """Put an error in, run the tests and take it out again; returns what became of it and the tests that failed."""
+    """Insert an error, run the tests and remove it; return its outcome and the failed tests."""
     name, old, new = mutation
     path = folder / name
     text = path.read_text(encoding="utf-8")

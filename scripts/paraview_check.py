@@ -1,11 +1,10 @@
-"""Do all of ParaView's readers show a result?  To be run by ParaView's Python: pvpython scripts/paraview_check.py DIR
+"""Check that all of ParaView's readers show a result, in ParaView's Python: pvpython scripts/paraview_check.py DIR
 
 Opens DIR/result.xdmf and DIR/interface.xdmf with each of ParaView's three readers of XDMF, goes through all states, and
-complains where an array that the file names is missing or has other values than with the first reader, a state has
-another label, or a mesh no elements.  With --pictures FOLDER the last state is drawn with each reader, warped by its
-displacement and coloured by every array, under its label and load factor.  --ranges FILE writes as JSON what was seen:
-for each file, reader and state its label, number of elements and the ranges of its arrays.  Exit code 1 if there are
-complaints.
+reports an array that is missing or differs from the first reader, a state with another label, and a mesh without
+elements. --pictures FOLDER draws the last state with each reader, warped by its displacement and coloured by every
+array, under its label and load factor. --ranges FILE writes, as JSON for each file, reader and state, the label, the
+number of elements and the ranges of the arrays.  The exit code is 1 if there are faults.
 
 Debian has it as the package `paraview`; without a display: xvfb-run -a pvpython scripts/paraview_check.py DIR
 """
@@ -40,7 +39,7 @@ def main():
 
 
 def seen_in(path, faults, pictures):
-    """Return the states of a file by reader; what is wrong is added to `faults`; drawn if there is a folder for it."""
+    """Return the states of a file by reader; append faults to `faults`; draw if `pictures` names a folder."""
     seen = {}
     for kind in READERS:
         reader = opened(kind, path)
@@ -61,7 +60,7 @@ def opened(kind, path):
 
 
 def state_of(reader, time):
-    """Return the label, number of elements and arrays of a state; of arrays the ranges of their components."""
+    """Return the label, the number of elements and the component ranges of all arrays of a state."""
     simple.UpdatePipeline(time=time, proxy=reader)
     data = leaf_of(servermanager.Fetch(reader))
     arrays = {}

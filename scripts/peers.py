@@ -1,4 +1,4 @@
-"""The solvers that this program is measured against: each is a KSP of PETSc, made by its options alone."""
+"""The peers of the benchmarks: each solver is a KSP of PETSc, defined by its options alone."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ class Peer:
 
     Attributes:
         options: of PETSc, without prefix.
-        note: what must be known to read its numbers.
-        matrix: type of the matrix that it takes.
-        sequential: whether one rank is all that it can use.
+        note: remark for readers of its numbers.
+        matrix: type of its matrix.
+        sequential: whether it runs on one rank only.
         direct: whether its solution is exact to rounding.
-        rigid: whether it is given the rigid-body modes.
+        rigid: whether it gets the rigid-body modes.
     """
 
     options: dict[str, str]
@@ -25,7 +25,7 @@ class Peer:
 
 
 def _bddc(prefix: str) -> dict[str, str]:
-    """Options of PCBDDC without which it fails or needs several times the iterations on these cells.
+    """Return the options without which PCBDDC fails or needs several times the iterations on these cells.
 
     The rotation as a near-null vector costs more than it saves on 2 ranks.
     """

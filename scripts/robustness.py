@@ -1,7 +1,7 @@
 """Iterations to 1e-8 at every combination of fibres, fraction, gap, cut, contrast, mesh, coating, mix, voids and nu.
 
-Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
-a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
+Each line of the CSV is one cell with three load cases.  Cells that the file already has are not run again, so that a
+long list can be worked off in parts. "uncut" leaves the matrix whole but still looks for soft modes.
 """
 
 import argparse
@@ -55,13 +55,13 @@ POROSITY = 0.05
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination.
+    """One combination of parameters.
 
-    `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of none, with a
-    stiffness over that of the matrix of `coating_contrast`. `mix` is the radius of fibres of a second phase / that of
-    the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`. `voids` is the radius of voids
-    / that of the fibres, 0 of none; their fraction is POROSITY. `poisson` is that of the matrix; where it is nearly
-    incompressible the elements are quadratic.
+    `pieces` of the matrix per fibre; `gap` in fibre diameters; `coating` thickness / radius, 0 for none;
+    `coating_contrast` is coating stiffness / matrix stiffness.  `mix` is the radius of second-phase fibres / radius of
+    the others, 0 for none; the second phase has half the fraction and the contrast `mix_contrast`.  `voids` is the
+    radius of voids / fibre radius, 0 for none; their fraction is POROSITY. `poisson` belongs to the matrix; a nearly
+    incompressible matrix has quadratic elements.
     """
 
     fibres: int
@@ -79,13 +79,13 @@ class Cell:
 
     @property
     def possible(self) -> bool:
-        """Return whether such a packing exists."""
+        """Whether such a packing exists."""
         return not (self.fraction >= 0.65 and self.gap > 0.1)
 
     def case(self, space: str) -> Case:
-        """Return the case, with that kind of coarse space.
+        """Return the case with a kind of coarse space.
 
-        Where there are coatings it and the cut are the program's own.
+        With coatings the program chooses the coarse space and the cut.
         """
         coating = {"coating": {"young": 3.0 * self.coating_contrast, "poisson": 0.3}} if self.coating else {}
         other = {"other": {"young": 3.0 * self.mix_contrast, "poisson": 0.3}} if self.mix else {}
@@ -120,7 +120,7 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Row(Cell):
-    """Outcome of a cell: `vectors` coarse vectors per subdomain, `boundary` dofs of the largest subdomain."""
+    """Outcome of a cell: `vectors` are coarse vectors per subdomain, `boundary` the dofs of the largest boundary."""
 
     dofs: int
     subdomains: int
@@ -131,11 +131,11 @@ class Row(Cell):
 
     @property
     def cell(self) -> Cell:
-        """The combination alone."""
+        """The combination of parameters alone."""
         return Cell(*(getattr(self, f.name) for f in fields(Cell)))
 
     def line(self) -> str:
-        """Line of the table."""
+        """Return the line of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
             f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}{self.voids:6.2g}{self.poisson:10.9g}"
@@ -144,7 +144,7 @@ class Row(Cell):
 
 
 def main() -> None:
-    """Work off the list."""
+    """Run all cells of the list."""
     arguments = _parser().parse_args()
     comm = MPI.COMM_WORLD
     show = print if comm.rank == 0 else _silent
@@ -168,7 +168,7 @@ def _silent(*_: object, **__: object) -> None:
 
 
 def combinations(arguments: argparse.Namespace) -> list[Cell]:
-    """All cells that the lists of the command line make."""
+    """Return all cells from the lists of the command line."""
     a = arguments
     bare = a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine
     coats = [(0.0, 1.0)] if a.coatings is None else list(product(a.coatings, a.coating_contrasts))

@@ -1,13 +1,12 @@
-"""Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
+"""Weak and strong scaling by ranks, cost by size, and a cost model for 64 and 1 024 ranks.
 
-Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
-strains together to 1e-8.  `multigrid` is the strong study with the coarse problem solved by multigrid (PETSc's GAMG in
-CG) in place of one factor by MUMPS, on as many ranks as there are cores; `large` is the largest cell on one rank, too.
-`events` are the first ones of paths of random cells that debond.  More ranks than cores take turns: their iterations
-and messages count, their times do not.
-`--threshold` is for all runs of the studies; give it a folder of its own.
-A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
-the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
+Each run is a separate MPI job: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, solves three
+unit strains together to 1e-8.  `multigrid` is the strong study with multigrid (PETSc's GAMG in CG) in place of one
+coarse factor by MUMPS, on at most one rank per core; `large` also runs the largest cell on one rank.  `events` runs the
+first events of paths of random cells that debond.  With more ranks than cores, iterations and messages count, but times
+do not.  `--threshold` holds for all runs of the studies; give such runs a separate folder.  A run with a report in
+DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables, the picture and the model
+cover all finished runs of the studies.  Remove the folder to measure again.
 """
 
 import argparse
@@ -41,7 +40,7 @@ STUDIES = {
 
 
 class Run(NamedTuple):
-    """A cell of about so many dofs, on so many ranks."""
+    """A cell of about `dofs` dofs, on `ranks` ranks."""
 
     fibres: int
     dofs: int
@@ -50,13 +49,13 @@ class Run(NamedTuple):
     way: str | None = None
 
     def report(self, out: Path) -> Path:
-        """Return where its report is."""
+        """Return the path of the report."""
         name = f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}"
         return out / "scaling" / f"{name}{f'_{self.way}' if self.way else ''}.json"
 
 
 def main() -> int:
-    """Work off the studies that are wanted; print and write what there is of all."""
+    """Make the runs of the chosen studies; print and write the results of all studies."""
     parser = _parser()
     arguments = parser.parse_args()
     if unknown := set(arguments.studies) - {*STUDIES, EVENTS}:
@@ -78,7 +77,7 @@ def main() -> int:
 
 
 def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
-    """Return the runs of each study; the cell of strong scaling is that of weak scaling on most ranks."""
+    """Return the runs of each study; strong scaling has the cell of weak scaling on most ranks."""
     fibres, dofs, refine, most = arguments.fibres, arguments.dofs, arguments.refine, max(arguments.ranks)
     ladder = [(max(1, round(fibres * size / dofs)), size) for size in arguments.sizes]
     return {
@@ -93,9 +92,9 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
 
 
 def use_memory(runs: Iterable[Run], out: Path) -> None:
-    """Write once to as much memory as the runs that have no report take, as far as it is there.
+    """Write once to as much memory as the runs without a report need, or to all available memory.
 
-    To a virtual machine each gigabyte that it has not used before may come in seconds, which would count as those of
+    A virtual machine may need seconds for each gigabyte that it has not used before, which would distort the times of
     the largest runs.
     """
     page, most = os.sysconf("SC_PAGE_SIZE"), max((run.dofs for run in runs if not run.report(out).exists()), default=0)
@@ -104,7 +103,7 @@ def use_memory(runs: Iterable[Run], out: Path) -> None:
 
 
 def work_off(run: Run, arguments: argparse.Namespace) -> bool:
-    """Make a run unless there is its report; of several, the fastest set-up and solve counts.  Whether it went well."""
+    """Make a run unless its report exists; the fastest set-up and solve counts.  Return whether it succeeded."""
     path = run.report(arguments.out)
     times = arguments.repeat if run.ranks <= arguments.cores else 1
     if path.exists():
@@ -128,7 +127,7 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
 
 
 def read(path: Path) -> list[Row]:
-    """Return the run of a report; none if there is no report."""
+    """Return the run of a report, or no run without a report."""
     if not path.exists():
         return []
     try:
@@ -138,9 +137,9 @@ def read(path: Path) -> list[Row]:
 
 
 def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> list[Row]:
-    """Return the runs of a study that are there.
+    """Return the finished runs of a study.
 
-    The largest run of weak scaling is one of strong scaling too; by itself it shows nothing.
+    The largest run of weak scaling also belongs to strong scaling; alone it shows nothing.
     """
     rows = [row for run in runs for row in read(run.report(arguments.out))]
     return rows if study in arguments.studies or len(rows) > 1 else []
@@ -172,7 +171,7 @@ def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[s
 
 
 def forecast_lines(futures: dict[str, list[Prediction]]) -> list[str]:
-    """Return a table of each series of predictions, then what stops the scaling."""
+    """Return a table of each series of predictions, then the parts that limit the scaling."""
     tables = [line for title, series in futures.items() for line in ("", *table(title, series))]
     return [*tables, "", *(line for title, series in futures.items() for line in verdict(title, series))]
 

@@ -1,8 +1,7 @@
 """Cost of an event of a debonding path on a number of ranks: runs, table and cost model.
 
-Seconds of an event = c + N (s + q / p) + messages(p) for N dofs on p ranks.  c, s and q are of least squares over the
-runs whose ranks each have a core; the messages are those that were counted on p ranks, with the latency that was
-measured between two.
+Seconds of an event = c + N (s + q / p) + messages(p) for N dofs on p ranks.  Least squares over the runs whose ranks
+each have a core give c, s and q. The messages were counted on p ranks, the latency was measured between two ranks.
 """
 
 import argparse
@@ -27,11 +26,11 @@ MESH_SIZE = 0.16
 class EventRow:
     """Sizes of a path, and means over its events.
 
-    Means are of seconds, dual problems, Krylov iterations, collective calls, exchanges of multipliers and kilobytes in
-    these of the busiest rank, in and out.
+    Means per event: seconds, dual problems, Krylov iterations, collective calls, exchanges of multipliers, and
+    kilobytes in and out of the busiest rank in these exchanges.
 
-    `worst` are the seconds of the longest event, `setup` those of all before the first; `neighbours` the messages of an
-    exchange of the rank with most; `latency` the seconds of one message.
+    `worst` are the seconds of the longest event, `setup` the seconds before the first event; `neighbours` the messages
+    of the busiest rank in an exchange; `latency` the seconds of one message.
     """
 
     fibres: int
@@ -60,16 +59,16 @@ class EventModel:
     latency: float
 
     def messages(self, row: EventRow) -> float:
-        """Seconds of the messages that were counted: of exchanges, and of collective calls log2 p deep."""
+        """Return the seconds of the counted messages: exchanges, and collective calls of depth log2 p."""
         return self.latency * (row.exchanges * row.neighbours + row.collectives * ceil(log2(row.ranks)))
 
     def seconds(self, row: EventRow) -> float:
-        """Seconds of an event of the size and the counts of the row."""
+        """Return the seconds of an event with the size and the counts of a row."""
         return self.constant + row.dofs * (self.serial + self.parallel / row.ranks) + self.messages(row)
 
 
 def fitted(rows: Sequence[EventRow], cores: int) -> EventModel:
-    """Return the model of least squares of logarithms.
+    """Return the model by least squares of logarithms.
 
     Raises:
         ValueError: the timed runs are of one size, or on one number of ranks.
@@ -86,7 +85,7 @@ def fitted(rows: Sequence[EventRow], cores: int) -> EventModel:
 
 
 def study(arguments: argparse.Namespace) -> tuple[bool, list[str]]:
-    """Make the runs that are not there yet; whether all went well, and their table."""
+    """Make the missing runs; return whether all succeeded, and the table."""
     rows = [
         row
         for fibres in arguments.event_fibres
@@ -98,7 +97,7 @@ def study(arguments: argparse.Namespace) -> tuple[bool, list[str]]:
 
 
 def work_off(fibres: int, ranks: int, arguments: argparse.Namespace) -> EventRow | None:
-    """Return the run in its report, which is made if it is not there; None if that fails."""
+    """Return the run of a report, made if missing; None if the run fails."""
     name = f"events_{arguments.events}_of_{fibres}_fibres_ranks_{ranks}.json"
     path = arguments.out / "scaling" / name
     if not path.exists():
@@ -116,7 +115,7 @@ def work_off(fibres: int, ranks: int, arguments: argparse.Namespace) -> EventRow
 
 
 def table(rows: Sequence[EventRow], cores: int) -> list[str]:
-    """Aligned lines: counts of all runs, seconds of those whose ranks have a core each, and the model for all."""
+    """Return lines: counts of all runs, seconds of runs whose ranks each have a core, and the model for all."""
     lines = [
         "events of debonding paths: on average of an event; kB and messages of the busiest rank, in and out",
         f"{'fibres':>7}{'ranks':>6}{'dofs':>9}{'events':>8}{'problems':>10}{'iterations':>12}{'messages':>10}{'collective':>12}{'kB':>9}"

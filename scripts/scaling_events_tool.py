@@ -1,6 +1,6 @@
-"""One path of the study of events in an MPI job of its own: the first events of a random cell that debonds.
+"""One path of the event study in a separate MPI job: the first events of a random cell that debonds.
 
-Rank 0 writes the report: seconds of an event, and what it takes of dual problems, iterations and exchanges.
+Rank 0 writes the report: seconds, dual problems, iterations and exchanges of an event.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def main() -> int:
 
 
 def measure(case: Case, arguments: argparse.Namespace, comm: MPI.Intracomm) -> EventRow:
-    """Return the row of a path, which is followed once for its times and once for its collective calls. Collective."""
+    """Return the row of a path, followed once for times and once for collective calls. Collective."""
     progress = Progress(comm, quiet=True)
     cell = tear(case, comm, progress)
     solver = cell.solver

@@ -1,4 +1,4 @@
-"""Least squares by which the scaling study finds the constants of its models."""
+"""Least-squares fits for the constants of the scaling study's models."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Shares:
     parallel: float
 
     def seconds(self, work: float, ranks: float) -> float:
-        """Seconds of so much work on so many ranks."""
+        """Return the seconds of `work` on `ranks` ranks."""
         return work * (self.serial + self.parallel / ranks)
 
 
@@ -30,7 +30,7 @@ class Power:
 
 
 def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[float]) -> Shares:
-    """Return the shares of `nonnegative` least squares.
+    """Fit `Shares` by `nonnegative` least squares.
 
     Raises:
         ValueError: all runs are on equally many ranks, so that the shares cannot be separated.
@@ -42,9 +42,9 @@ def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[
 
 
 def nonnegative(columns: Float, seconds: Float, known: Float) -> Float:
-    """(k,) x >= 0 with the least sum of squares of log((columns x + known) / seconds).
+    """Return x >= 0 (k,) with the least sum of squares of log((columns x + known) / seconds).
 
-    Logarithms, so that twice as long and half as long are equally wrong.  `columns` (runs, k), the others (runs,).
+    With logarithms, twice as long and half as long are equally wrong.  `columns` (runs, k), other arrays (runs,).
     """
     relative = columns / seconds[:, None]
     scale = relative.mean(axis=0)
@@ -58,7 +58,7 @@ def nonnegative(columns: Float, seconds: Float, known: Float) -> Float:
 
 
 def fit_power(work: Sequence[float], seconds: Sequence[float]) -> Power:
-    """Return the power of the work with the least sum of squares of logarithms, each times the seconds.
+    """Fit a `Power` of the work by least squares of logarithms, weighted with the seconds.
 
     Raises:
         ValueError: all runs have equal work.

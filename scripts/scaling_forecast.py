@@ -14,7 +14,7 @@ STRONG_DOFS, WEAK_DOFS = 10_000_000, 1_000_000
 
 
 def forecast(rates: Rates, machine: Machine, way: str | None = None) -> dict[str, list[Prediction]]:
-    """Strong and weak scaling over RANKS, with that way to solve the coarse problem, by default the program's."""
+    """Predict strong and weak scaling over RANKS, with a given coarse solver, by default the program's own."""
     words = f", coarse problem by {way}" if way else ""
     return {
         f"strong scaling of {STRONG_DOFS / 1e6:g} million dofs{words}": [
@@ -66,12 +66,12 @@ def _powers(f: Factor, of: str) -> str:
 
 
 def _shares(s: Shares) -> str:
-    """Shares in words."""
+    """Return shares in words."""
     return f"({s.serial:.2g} + {s.parallel:.2g} / p)"
 
 
 def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> list[str]:
-    """Return the model beside every run that was timed: seconds of both, and its relative error."""
+    """Return seconds of each timed run and of the model, and the model's relative error."""
     names = ("mesh", "assemble", "set-up", "solve", "total")
     lines = [
         "model, measured seconds, and the model's error",
@@ -98,7 +98,7 @@ def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> l
 
 
 def table(title: str, found: Sequence[Prediction]) -> list[str]:
-    """Predicted seconds, and efficiencies: dofs per second and rank, of those of one rank."""
+    """Return predicted seconds and efficiencies: dofs per second and rank / dofs per second of one rank."""
     names = ("mesh", "assemble", "set-up", "apply", "factor", "coarse", "messages", "total", "efficiency", "of solver")
     lines = [
         f"{title}: seconds",
@@ -116,7 +116,7 @@ def table(title: str, found: Sequence[Prediction]) -> list[str]:
 
 
 def verdict(title: str, found: Sequence[Prediction]) -> list[str]:
-    """Return the shares of time on many ranks, and those that further ranks do not reduce."""
+    """Return the shares of time on many ranks, and the shares that further ranks do not reduce."""
     lines = []
     for p in found:
         if p.ranks in FAR:

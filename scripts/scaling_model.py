@@ -1,7 +1,7 @@
-"""A cost model of the solver on more ranks than there are here, with rates measured on few.
+"""A cost model of the solver on many ranks, with rates measured on few.
 
-Every term is one that the program has today: a mesh and a tearing of which some share is dealt to the ranks, work on
-subdomains that ranks share, coarse problems that they factor together, and messages.
+Every term is a part of today's program: a mesh and a tearing that ranks partly share, work on subdomains that ranks
+share fully, coarse problems that ranks factor together, and messages.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -35,7 +35,7 @@ class Machine:
 class Factor:
     """Seconds of the factor of n unknowns and of the solves of an iteration.
 
-    They are shares of n to powers, which are those of the runs on one rank.
+    They are shares of powers of n; runs on one rank give the exponents.
     """
 
     factor: Shares
@@ -44,13 +44,13 @@ class Factor:
     solve_power: float
 
     def seconds(self, n: float, ranks: int) -> tuple[float, float]:
-        """Seconds of both."""
+        """Return the seconds of the factor and of the solves."""
         return self.factor.seconds(n**self.factor_power, ranks), self.solve.seconds(n**self.solve_power, ranks)
 
 
 @dataclass(frozen=True)
 class Multigrid:
-    """Seconds per coarse vector of set-up, and of a solve, which takes `inner` iterations a load at any size."""
+    """Seconds per coarse vector of set-up, and of a solve of `inner` iterations per load, at any size."""
 
     setup: Shares
     solve: Shares
@@ -62,16 +62,16 @@ class Rates:
     """Measured: seconds per unit of work, and sizes per dof.
 
     Attributes:
-        mesh: of a coarse triangle.
+        mesh: seconds per coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        coarse, natural: of the coarse vectors, and of the rigid-body motions.
-        multigrid: if it was timed.
+        coarse, natural: factors of the coarse vectors, and of the rigid-body motions.
+        multigrid: rates of multigrid, if timed.
         loads: load cases solved together.
         triangles, subdomains, vectors, kernel: per dof.
-        largest_coarse: most coarse vectors that were timed.
-        iterations: most of all runs.
-        surface: values that a rank sends or receives in an exchange per root of its dofs.
-        neighbours: ranks that it sends to or receives from in an exchange.
+        largest_coarse: largest timed number of coarse vectors.
+        iterations: largest number in all runs.
+        surface: values that a rank sends or receives in an exchange / square root of its dofs.
+        neighbours: ranks that a rank sends to or receives from in an exchange.
         imbalance: dofs of the fullest rank relative to the mean.
     """
 
@@ -95,7 +95,7 @@ class Rates:
 
 
 def measured(rows: Sequence[Row], cores: int) -> Rates:
-    """Rates from the rows: times from those whose ranks each have a core, sizes and counts from all.
+    """Return the rates: times from rows whose ranks each have a core, sizes and counts from all rows.
 
     Raises:
         ValueError: the timed rows are on too few numbers of ranks, or of too few sizes.
@@ -106,7 +106,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
 
 
 def network(rows: Sequence[Row], cores: int) -> Machine:
-    """Medians of the messages that were timed between two ranks that each have a core.
+    """Return medians of the messages that were timed between two ranks with a core each.
 
     Raises:
         ValueError: there is no such run.
@@ -118,7 +118,7 @@ def network(rows: Sequence[Row], cores: int) -> Machine:
 
 
 def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
+    """Return seconds per unit of work: of subdomains on one rank, of the mesh on all ranks with a core."""
     timed = [row for row in rows if row.ranks <= cores]
     alone = [row for row in timed if row.ranks == 1 and row.way == FACTOR]
     cells = _meshed_alike(timed)
@@ -140,7 +140,7 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 
 
 def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
-    """Rows of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are none."""
+    """Return rows of cells so large that all ranks mesh them, as in the forecast, or else all rows."""
     return [row for row in rows if row.fibres >= DEFAULT_TILES.least_discs] or rows
 
 
@@ -155,7 +155,7 @@ def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 
 
 def _factor(rows: Sequence[Row], unknowns: str, factor: str, solve: str) -> Factor:
-    """From the attributes of rows with these names."""
+    """Fit a factor to the attributes of rows with these names."""
 
     def fitted(seconds: str) -> tuple[Shares, float]:
         alone = [(getattr(row, unknowns), getattr(row, seconds)) for row in rows if row.ranks == 1]
@@ -166,7 +166,7 @@ def _factor(rows: Sequence[Row], unknowns: str, factor: str, solve: str) -> Fact
 
 
 def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
-    """Return the times of the rows by multigrid, None without any."""
+    """Return the times of the rows by multigrid, or None."""
     if not rows:
         return None
     setup, solve = (
@@ -177,12 +177,12 @@ def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
 
 
 def _dealt(rows: Sequence[Row], work: Callable[[Row], float], seconds: Callable[[Row], float]) -> Shares:
-    """Shares of what takes the runs so many seconds for so much work."""
+    """Return the serial and parallel shares for the runs' seconds and work."""
     return fit_shares([work(row) for row in rows], [row.ranks for row in rows], [seconds(row) for row in rows])
 
 
 def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
-    """Sizes per dof."""
+    """Return sizes per dof."""
     return dict(
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
@@ -205,7 +205,7 @@ def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
-    """All seconds over all work, so that large runs count most."""
+    """Return all seconds / all work, so that large runs count most."""
     seconds, work = (float(sum(values)) for values in zip(*pairs, strict=True))
     return max(seconds / work, 0.0)
 
@@ -226,7 +226,7 @@ class Prediction:
 
     @property
     def parts(self) -> dict[str, float]:
-        """Seconds by what they are spent on."""
+        """The seconds of each part."""
         return {
             MESH: self.mesh,
             LOCAL: self.assemble + self.setup + self.apply,
@@ -267,10 +267,10 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | 
 
 
 def _coarse_seconds(rates: Rates, dofs: float, ranks: int, way: str | None) -> tuple[float, float]:
-    """Seconds of the coarse factor or of multigrid's set-up, and of a solve of all loads.
+    """Return the seconds of the coarse factor or of multigrid's set-up, and of a solve of all loads.
 
     Raises:
-        ValueError: that way was not timed.
+        ValueError: this coarse solver was not timed.
     """
     vectors = max(rates.vectors * dofs, 2.0)
     if way == MULTIGRID:
@@ -282,7 +282,7 @@ def _coarse_seconds(rates: Rates, dofs: float, ranks: int, way: str | None) -> t
 
 
 def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None) -> float:
-    """Seconds of all messages of the iterations; those within a coarse factor are in its shares."""
+    """Return the seconds of all messages of the iterations; the coarse factor's shares include its own messages."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))

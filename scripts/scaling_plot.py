@@ -48,7 +48,7 @@ def _iterations(axes: Axes, studies: dict[str, list[Row]]) -> None:
 
 
 def _messages(axes: Axes, studies: dict[str, list[Row]]) -> None:
-    """Multipliers sent in an iteration by ranks."""
+    """Draw the multipliers sent in an iteration by ranks."""
     for study, rows in studies.items():
         ink, several = STUDY_INK[study], [row for row in rows if row.ranks > 1]
         sent = [row.sent / 1e3 for row in several]
@@ -57,7 +57,7 @@ def _messages(axes: Axes, studies: dict[str, list[Row]]) -> None:
 
 
 def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
-    """Cost per dof by size."""
+    """Draw the cost per dof by size."""
     axes.set_visible(len(rows) > 0)
     places, start = np.arange(len(rows)), np.zeros(len(rows))
     for stage, ink in zip(STAGES, STAGE_INK, strict=True):
@@ -69,7 +69,7 @@ def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def _shares(axes: Axes, futures: dict[str, list[Prediction]]) -> None:
-    """Return where the model sees the time go."""
+    """Draw the predicted shares of time."""
     found = [p for series in futures.values() for p in series]
     names = [f"{title.split()[0]}, p = {p.ranks}: {p.total:.0f} s" for title, series in futures.items() for p in series]
     places, start = np.arange(len(found)), np.zeros(len(found))

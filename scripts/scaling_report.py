@@ -24,14 +24,13 @@ FACTOR, MULTIGRID = ("factor", "multigrid")
 
 @dataclass(frozen=True)
 class Row:
-    """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
+    """A run: its parameters, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
-    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` is how the coarse problem is
-    solved, in how many iterations `inner`.  Seconds are those of the coarse problem, of its set-up with the modes and
-    the factor, and of that of the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are
-    the MB of each rank by stage, `coarse_memory` those by which both factors let them grow.  `latency` (s) and
-    `bandwidth` (bytes / s) are those of messages between two ranks.  Of the seconds of the mesh rank 0 is `alone` for
-    some, while others wait.
+    `wanted` are the requested dofs, `fullest` the dofs of the fullest rank; `way` is the coarse solver, with `inner`
+    iterations.  `coarse_...` are seconds of the coarse problem (set-up includes modes and factor), `natural_...` of the
+    problem of rigid-body motions, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
+    `coarse_memory` the growth by both factors.  `latency` (s) and `bandwidth` (bytes / s) describe messages between two
+    ranks.  `alone` are the seconds of the mesh in which rank 0 works and others wait.
     """
 
     fibres: int
@@ -88,29 +87,29 @@ class Row:
 
     @property
     def values(self) -> int:
-        """Values that the rank with most sends and receives in an exchange."""
+        """Values that the busiest rank sends and receives in an exchange."""
         return max(outgoing + incoming for outgoing, incoming in zip(self.outgoing, self.incoming, strict=True))
 
     @property
     def sent(self) -> int:
-        """Bytes of multipliers that the rank with most sends in an iteration."""
+        """Bytes of multipliers that the busiest rank sends in an iteration."""
         pairs = zip(self.outgoing, self.incoming, strict=True)
         return VALUE_BYTES * max(GATHERS * outgoing + SUMS * incoming for outgoing, incoming in pairs)
 
     @property
     def messages(self) -> int:
-        """Messages with multipliers that the rank with most sends and receives in an iteration."""
+        """Messages with multipliers that the busiest rank sends and receives in an iteration."""
         return (GATHERS + SUMS) * max(self.neighbours)
 
     @property
     def miscounted(self) -> float:
-        """Relative difference of the counted bytes from those that PETSc logged, on the worst rank."""
+        """Relative difference of the counted bytes from the bytes in PETSc's log, on the worst rank."""
         counted = [VALUE_BYTES * self.exchanges * sum(pair) for pair in zip(self.outgoing, self.incoming, strict=True)]
         return max(abs(a - b) / max(b, 1.0) for a, b in zip(counted, self.logged, strict=True))
 
 
 def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
-    """Aligned lines, without the times of ranks that take turns."""
+    """Return aligned lines, without the times of ranks that share cores."""
     lines = [
         f"{'':50}{'iteration of the busiest rank':^31}{'seconds':^45}",
         f"{'ranks':>5}{'fibres':>8}{'dofs':>10}{'domains':>8}{'coarse':>8}{'iterations':>11}{'kB sent':>10}"
@@ -127,10 +126,10 @@ def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
 
 
 def memory(rows: Sequence[Row]) -> list[str]:
-    """Aligned lines of memory.
+    """Return aligned lines of memory.
 
-    They give peaks of the rank with most in each stage, of rank 0 and of all others when it meshes, and what the coarse
-    factorization takes of each.
+    They give the peak of the fullest rank in each stage, the peaks of rank 0 and of all others in the mesh stage, and
+    the memory of the coarse factorization.
     """
     lines = [
         "MB of the rank with most, interpreter and libraries included; of rank 0 and of the others (on average)",
@@ -148,7 +147,7 @@ def memory(rows: Sequence[Row]) -> list[str]:
 
 
 def by_size(rows: Sequence[Row]) -> list[str]:
-    """Aligned lines: microseconds of a rank per dof, and memory of all ranks per dof."""
+    """Return aligned lines: microseconds of a rank per dof, and memory of all ranks per dof."""
     lines = [
         f"{'dofs':>10}{'ranks':>6}{'fibres':>8}{'coarse':>8}{'iterations':>11}{'seconds':>9}"
         + "".join(f"{s:>9}" for s in (*STAGES, "total")) + f"{'MB':>9}{'kB/dof':>8}",
@@ -168,7 +167,7 @@ def _per_dof(row: Row, seconds: float) -> float:
 
 
 def speedups(rows: Sequence[Row], cores: int) -> list[str]:
-    """Return how many times as many dofs a second as on one rank."""
+    """Return dofs per second / dofs per second on one rank."""
     lines = []
     for one in (row for row in rows if row.ranks == 1):
         for row in (row for row in rows if 1 < row.ranks <= cores):
@@ -181,7 +180,7 @@ def speedups(rows: Sequence[Row], cores: int) -> list[str]:
 
 
 def write(path: Path, studies: dict[str, list[Row]]) -> None:
-    """All rows as CSV; bytes and messages are those of an iteration."""
+    """Write all rows as CSV; bytes and messages are per iteration."""
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(["study", *COLUMNS, *STAGES])

@@ -1,7 +1,7 @@
-"""One run of the scaling study in an MPI job of its own: tear, set up and solve a random cell, count its messages.
+"""One run of the scaling study in a separate MPI job: tear, set up and solve a random cell, count its messages.
 
-The cell has fibre fraction 0.6 and gaps of 4 % of the fibres' diameter; it is cut as it would be by default, and the
-three unit strains are solved together.  Rank 0 writes the report.
+The cell has fibre fraction 0.6 and gaps of 4 % of the fibres' diameter; it is cut as by default, and the three unit
+strains are solved together.  Rank 0 writes the report.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def main() -> int:
 
 
 class StagePeaks(Progress):
-    """Keeps the peak of resident memory of each stage too, in megabytes of this rank."""
+    """Progress that also keeps the peak of resident memory of each stage, in megabytes of this rank."""
 
     def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
         super().__init__(comm, quiet)
@@ -100,12 +100,12 @@ class StagePeaks(Progress):
         self.peaks[name] = peak()
 
     def all_peaks(self) -> dict[str, list[float]]:
-        """Peaks of every rank, by stage.  Collective."""
+        """Return the peaks of every rank, by stage.  Collective."""
         return {name: self.comm.allgather(megabytes) for name, megabytes in self.peaks.items()}
 
 
 def random_cell(fibres: int, dofs: int, refine: int, options: dict[str, str | float]) -> Case:
-    """Return a case with about so many degrees of freedom, and PETSc's options of its coarse space."""
+    """Return a case with about `dofs` degrees of freedom, and the PETSc options of its coarse space."""
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -121,7 +121,7 @@ def random_cell(fibres: int, dofs: int, refine: int, options: dict[str, str | fl
 
 
 def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]:
-    """Seconds, iterations, sizes, memory and messages of a case."""
+    """Return seconds, iterations, sizes, memory and messages of a case."""
     comm = progress.comm
     network = {name: ping(comm, *sizes) for name, sizes in PINGS.items()}
     cell = tear(case, comm, progress)
@@ -156,7 +156,7 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
 
 
 def seconds_alone(case: Case, policy: TilePolicy) -> float:
-    """In which rank 0 meshes a cell, but for the nodes that all place, and fills one that is not cut into tiles."""
+    """Return the seconds in which rank 0 alone meshes a cell, without placing nodes; it fills cells without tiles."""
     start = time.perf_counter()
     unmeshed = begin_mesh(case, policy)
     assert isinstance(unmeshed, UnmeshedCell)
@@ -174,9 +174,9 @@ def seconds_alone(case: Case, policy: TilePolicy) -> float:
 def _messages(cell: TornCell) -> dict[str, Any]:
     """Count the messages of a rank in one exchange of multipliers, and the exchanges of the solves.
 
-    `outgoing` and `incoming` count the values, for all loads, and `neighbours` the ranks that a rank sends to or
-    receives from in a gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in
-    the solves.
+    `outgoing` and `incoming` count the values for all loads, `neighbours` the ranks that a rank sends to or receives
+    from in a gather; in a sum, senders and receivers swap.  `logged` are the bytes in both directions that PETSc
+    counted in the solves.
     """
     comm = cell.comm
     counts = LOADS * np.array(comm.allgather(foreign(cell.solver.jump_operator, comm)))
@@ -191,7 +191,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
 
 
 def foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
-    """(ranks,) local rows that each of the other ranks owns."""
+    """Return the numbers (ranks,) of local rows that each of the other ranks owns."""
     ends = np.array(comm.allgather(jump_operator.owned[1]))
     counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)
     counts[comm.rank] = 0
@@ -199,7 +199,7 @@ def foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
 
 
 def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
-    """Seconds of a message of `size` bytes from rank 0 to 1 and back, the mean of `times`; 0 on one rank."""
+    """Return the mean seconds of `times` messages of `size` bytes from rank 0 to 1 and back; 0 on one rank."""
     message, seconds = bytearray(size), 0.0
     comm.Barrier()
     if comm.rank < 2 <= comm.size:
@@ -218,11 +218,10 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
 def _coarse(
     coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: str | None
 ) -> dict[str, Any]:
-    """Seconds and megabytes of the coarse space.
+    """Return seconds and megabytes of the coarse space.
 
-    Seconds are those to set it up, to sum and factor the coarse matrix, of which each rank has made its part, and that
-    of the rigid-body motions, and to solve with them as often as an iteration does; megabytes by which the factors let
-    the memory of each rank grow.
+    The seconds are for set-up, for summing and factoring the coarse matrix from the ranks' parts and the matrix of the
+    rigid-body motions, and for the solves of one iteration.  The megabytes are the growth of each rank by the factors.
     """
     right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
@@ -249,7 +248,7 @@ def _coarse(
 
 
 def fastest(work: Callable[[], object]) -> float:
-    """Seconds of the fastest of TIMED calls."""
+    """Return the seconds of the fastest of TIMED calls."""
     return min(seconds_of(work) for _ in range(TIMED))
 
 

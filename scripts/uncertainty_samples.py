@@ -1,8 +1,8 @@
-"""Propagated scatter beside that of samples: a cell of correlated, uncertain phases, run with sampled constants.
+"""Propagated scatter beside sampled scatter: a cell of correlated, uncertain phases, run with sampled constants.
 
     mpirun -n 2 .venv/bin/python scripts/uncertainty_samples.py --samples 2000
 
-Prints for every constant the standard deviation of first order and that of the samples, with its own sampling error.
+Prints for every constant the first-order and the sampled standard deviation, the latter with its sampling error.
 """
 
 import argparse
@@ -29,7 +29,7 @@ CASE: dict[str, Any] = {
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Compare both; samples are divided among the ranks."""
+    """Compare both standard deviations; samples are divided among the ranks."""
     from mpi4py import MPI
 
     document = copy.deepcopy(CASE)
@@ -50,7 +50,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def constants(names: tuple[str, ...], values: Any, comm: Any) -> Any:
-    """Return all constants of a cell with these values."""
+    """Return all constants of a cell with given values."""
     document = copy.deepcopy(CASE)
     del document["uncertainty"]
     for name, value in zip(names, values, strict=True):

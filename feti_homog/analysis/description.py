@@ -68,10 +68,10 @@ def _cost_lines(
 ) -> Iterator[str]:
     """Yield lines about the solver, ranks and memory; for a path, also up to complete debonding.
 
-    `subdomains` and `nodes` have a count for each rank; pieces are dense by default.
+    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.
 
     Raises:
-        CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
+        CaseError: as `solver_plan.choose`, or a case with friction has no influence columns.
     """
     problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across

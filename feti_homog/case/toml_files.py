@@ -155,7 +155,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the only entry of a list, unless `name` is a section number; return any other table unchanged."""
+    """Return the entry of a list with one entry, unless `name` is a section number, else `table` itself."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 

@@ -23,7 +23,7 @@ def table(source: Path) -> str:
     `angle`, coatings the column `coating`.  Numbers are exact, so that the table reproduces the cell.
 
     Raises:
-        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse, or voids are unknown.
+        CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is no disc or ellipse.
     """
     fibres = read(source)
     if fibres.lacks_voids:

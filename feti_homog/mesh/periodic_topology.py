@@ -162,7 +162,7 @@ class Torus:
 
     @cached_property
     def arcs(self) -> Int:
-        """The plane edge (a,) of each of the `arc_edges` in the mesh."""
+        """The plane edges (a,) of the mesh's `arc_edges`."""
         return self.plane_edges(self.mesh.arc_edges)
 
     def plane_edges(self, pairs: Int32) -> Int:

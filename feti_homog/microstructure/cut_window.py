@@ -21,9 +21,9 @@ def moves(outlines: Outlines, size: Float) -> Float:
     """Compute the moves d (N, 2) that separate outlines across the border of the torus.
 
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2 such that no gap becomes less than
-    the smallest gap within the border. Gaps are relative to the sum of the radii, and the smallest one is taken between
-    LEAST_GAP and MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n;
-    since n . v <= |v|, its solution keeps the distances.
+    the smallest gap within the border. Gaps are relative to the sum of the radii; the smallest gap is limited to
+    LEAST_GAP to MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n; since
+    n . v <= |v|, its solution keeps the distances.
 
     Other outlines than discs have the radii of equal-area discs; n is the direction of the largest gap
     n . v - r, where r is the sum of both supports along n.

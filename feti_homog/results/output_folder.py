@@ -117,7 +117,7 @@ def _is_own(path: Path) -> bool:
 
 
 def latest(directory: Path) -> dict[str, Any]:
-    """Return the content of result.json, or of an unfinished path with more points.  Call on one rank.
+    """Return result.json, or an unfinished path if it has more points.  Call on one rank.
 
     For an unfinished path, the entry `unfinished` and the `status` give the number of points and the load.
     Raises CaseError for a missing, damaged or unreadable file.

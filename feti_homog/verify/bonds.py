@@ -173,7 +173,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, else 0.
 
-    If the slip is C_0 t + g under the shear traction t, the damaged fraction bears t - g / (C - C_0); C_0 is intact.
+    If the slip is C_0 t + g (C_0 intact) under the shear traction t, the damaged fraction bears t - g / (C - C_0).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

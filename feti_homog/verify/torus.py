@@ -59,7 +59,7 @@ class TornNodes:
 
 
 def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornNodes, float]:
-    """Find torn sides and nodes on the torus of a cell with `size` (2,), and the radius of a place."""
+    """Find torn sides and nodes on the torus of a cell with `size` (2,); return them and the matching radius."""
     m, columns = mesh.triangles.shape
     local = [(side, (side + 1) % 3, 3 + side)[: columns // 3 + 1] for side in range(3)]
     sides_of_elements = mesh.triangles[:, local].reshape(3 * m, -1)
@@ -123,10 +123,10 @@ def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
 
 
 def bodies(mesh: Mesh, phases: tuple[str, ...], sides: TornSides) -> tuple[Int, Int]:
-    """Return the parts of subdomains (subdomains,), and the ranks of parts (parts,), ascending inwards.
+    """Return the part (subdomains,) of each subdomain and the order (parts,) of parts from the matrix inwards.
 
-    A part is a connected region of one phase on the torus.  Parts are ranked by the number of parts between them and
-    the matrix, then coatings before other phases, then by body labels.
+    A part is a connected region of one phase on the torus.  The order is by the number of parts between a part and the
+    matrix, then coatings before other phases, then by body labels.
     """
     paired = np.flatnonzero(sides.partner >= 0)
     ends = np.stack([sides.element[paired], sides.element[sides.partner[paired]]])

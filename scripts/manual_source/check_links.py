@@ -1,4 +1,4 @@
-"""Fails if a page of the manual refers to a file or a place in a page that is not there, or loads one of another host.
+"""Fail if a page of the manual links to a missing file or a missing place, or loads a file of another host.
 
 Usage: check_links.py FOLDER
 """
@@ -27,7 +27,7 @@ class Page(HTMLParser):
 
 
 def faults(folder: Path) -> list[str]:
-    """One line for each reference that leads nowhere, and for each file that is loaded from another host."""
+    """Return a line for each broken reference and for each file that a page loads from another host."""
     pages = {path.resolve(): Page(path) for path in folder.rglob("*.html")}
     return [
         f"{path.relative_to(folder.resolve())}: <{tag}> {address}: {words}"

@@ -1,4 +1,4 @@
-"""Settings of Sphinx for `scripts/manual`, which lays the sources out in build/manual_source."""
+"""Settings of Sphinx for `scripts/manual`, which puts the sources into build/manual_source."""
 
 import sys
 from importlib.metadata import distribution

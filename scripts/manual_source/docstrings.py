@@ -1,7 +1,7 @@
 """A Sphinx extension that shows the project's docstrings: plain text with `names` in single backticks.
 
-What would be markup in reStructuredText (|x|, *, lam_, K^-1) is text here; `names` of the package become links,
-other words in backticks code. Attributes that the docstring of their class describes stand there with their type.
+Markup of reStructuredText (|x|, *, lam_, K^-1) is text here; `names` of the package become links, other words in
+backticks become code. Attributes that the docstring of their class describes stand there with their type.
 """
 
 import re
@@ -20,7 +20,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def add_filters(environment: Environment) -> None:
-    """Give the templates what they ask of a class."""
+    """Add the filters that the templates apply to a class."""
     environment.filters |= {"described": described, "names_described": names_described}
 
 
@@ -29,7 +29,7 @@ def _to_markup(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines:
 
 
 def markup(docstring: str) -> str:
-    """Return the docstring in reStructuredText; indented blocks, as of formulas, stay as they are."""
+    """Return the docstring in reStructuredText; indented blocks, such as formulas, stay as they are."""
     blocks, in_section = [], False
     for block in re.split(r"\n[ ]*\n", docstring):
         if block.startswith(" ") and not in_section:

@@ -1,4 +1,4 @@
-"""A Sphinx extension that reads each formula as the manual is built: MathJax would show a fault to readers alone."""
+"""A Sphinx extension that checks each formula during the build: MathJax would show faults only to readers."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""Lays out what Sphinx reads: the documents where they stand in the repository, and the pages made from the code.
+"""Lay out the input of Sphinx: the documents, placed as in the repository, and the pages made from the code.
 
 Usage: lay_out.py FOLDER
 """

@@ -18,7 +18,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def plain(text: str) -> str:
-    """Return the text with what Markdown would take for markup escaped, but for `code`."""
+    """Return the text with Markdown's markup characters escaped, except in `code`."""
     pieces = text.split("`")
     pieces[::2] = [re.sub(r"[\\*_\[\]<>$#~|]", r"\\\g<0>", piece) for piece in pieces[::2]]
     pieces[1::2] = [piece.replace("|", r"\|") for piece in pieces[1::2]]
@@ -31,5 +31,5 @@ def code(word: str) -> str:
 
 
 def capitalised(words: str) -> str:
-    """Return the words with a capital at their beginning; the others stay."""
+    """Return the text with a capital first letter; other letters stay as they are."""
     return words[:1].upper() + words[1:]

@@ -81,7 +81,7 @@ def _keys(kind: type, above: str = "") -> Iterator[ResultKey]:
 
 
 def _items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
-    """Yield the items of a group with these views."""
+    """Yield the items of a group with its views."""
     hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):

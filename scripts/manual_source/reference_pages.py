@@ -1,4 +1,4 @@
-"""Pages of the manual that are made from the code: commands, keys of case files, options, and what is written."""
+"""Pages of the manual that are made from the code: commands, keys of case files, options and results."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ def write(folder: Path) -> None:
 
 
 def command_line() -> str:
-    """All commands with their arguments, and the exit codes."""
+    """Return all commands with their arguments, and the exit codes."""
     parts = ["# Command line", _console(command_parser().format_help())]
     for name, parser in _commands():
         parts += [f"## feti-homog {name}", _console(parser.format_help())]
@@ -47,7 +47,7 @@ def case_file() -> str:
 
 
 def petsc_options() -> str:
-    """PETSc's options that the solver takes."""
+    """Return the PETSc options that the solver takes."""
     words = (
         "Options of the solver, on the command line, or without the dash in the section `[petsc]` of a case file; "
         "the command line has precedence. `feti-homog options` prints them."

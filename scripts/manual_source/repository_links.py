@@ -1,7 +1,7 @@
 """A Sphinx extension that leads links of the documents to pages of the manual.
 
-A link to a folder or module of the repository goes to its page: that of its README.md, or that of the API reference.
-A name in backticks as `mesh.mesh_fibres.unwrap`, which is below feti_homog, goes to its place in the API reference.
+A link to a folder or module of the repository goes to the page of its README.md, or to its page in the API reference. A
+name in backticks below feti_homog, such as `mesh.mesh_fibres.unwrap`, links to the API reference.
 """
 
 import re

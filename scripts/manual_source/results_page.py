@@ -1,4 +1,4 @@
-"""The page on what a run and a sweep write, made from the records that the writers of the files use."""
+"""The page on the files of a run and a sweep, made from the records that the file writers use."""
 
 from collections.abc import Iterable
 
@@ -46,7 +46,7 @@ along x3, but for the displacement E33 x3."""
 
 
 def results() -> str:
-    """result.json, result.h5 and the tables."""
+    """Return the page on result.json, result.h5 and the tables."""
     keys = table(["key", "type", "unit", "meaning"], [(code(k.path), k.type, k.unit, k.meaning) for k in schema_keys()])
     fields = _fields(items())
     spatial = _fields(spatial_items())

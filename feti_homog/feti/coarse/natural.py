@@ -95,7 +95,7 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return G^T A G with stored products, 36 numbers per row.  The first call is collective.
+        """Return the matrix G^T A G; it stores 36 products per row.  The first call is collective.
 
         The pieces of the pinned body are glued to the pinned class and cannot move.
         """

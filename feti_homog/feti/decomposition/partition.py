@@ -99,7 +99,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Choose `count` pieces (b,) for bodies with `load` (b,) triangles: the largest pieces are divided first."""
+    """Distribute `count` pieces (b,) over bodies with `load` (b,) triangles: divide the largest pieces first."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -113,7 +113,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose numbers of pieces (b,) with about `max_dofs` dofs at most, for bodies with `load` (b,) triangles."""
+    """Choose piece counts (b,) for pieces of about `max_dofs` dofs, for bodies with `load` (b,) triangles."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 

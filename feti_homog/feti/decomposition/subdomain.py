@@ -204,7 +204,7 @@ class Subdomain:
     def elimination_order(self) -> Int | None:
         """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
 
-        This holds below LEAST_ORDERED_DOFS dofs, and for coarse nodes only, where all triangles would be halved.
+        The library's order is cheaper below LEAST_ORDERED_DOFS dofs, and without refinement.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None

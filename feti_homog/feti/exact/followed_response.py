@@ -36,7 +36,7 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows of pins, which stop bodies that no active row stops.
-        had_pins: whether a body has been free: then U loses digits with every change of its few faces.
+        had_pins: whether a body has been free; U then loses digits with every change of that body's few faces.
     """
 
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
@@ -172,7 +172,7 @@ class FollowedResponse:
         return B is not None
 
     def _turn(self, rows: Int, sign: Float, gain: Float, pivot: float) -> bool:
-        """Update for rows that become inactive (sign 1) or active (-1); False as `follow`.  Collective.
+        """Update for rows that become inactive (sign 1) or active (-1); return `follow`.  Collective.
 
         Pins on which a new active row exerts a force become inactive.
         """

@@ -31,7 +31,7 @@ from feti_homog.typing import Float, Int
 class AssembledSchur:
     """The assembled Schur complement Z^T S Z of all subdomains; every rank has the whole factor.
 
-    Boundary displacements u = Z y have no jump on active rows, B Z = 0: all copies of a node move together, but along
+    Boundary displacements u = Z y have no jump on active rows, B Z = 0: all copies of a node move together, but at
     inactive rows the copies of the inner body move independently.
 
     Attributes:

@@ -147,7 +147,7 @@ class ContactProblem:
         return mixed_load.solve(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Add amplitudes and jumps, by F lambda, to a state without amplitudes.  Collective."""
+        """Compute the amplitudes and jumps that a state lacks, by F lambda.  Collective."""
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)

@@ -106,7 +106,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _longest_branch(self) -> float:
-        """The largest s in either pure mode at all nodes."""
+        """The largest branch length s over both pure modes and all nodes."""
         onsets = self._onsets
         ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
         largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))

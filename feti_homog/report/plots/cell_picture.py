@@ -185,7 +185,7 @@ def deformed(
 
     The figure also has the states of the interface.  Displacements in the plane are magnified, beside the undeformed
     outline.  A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
-    shear, isotherms a conduction, with minus the flux.
+    shear.  A conduction has isotherms, with minus the flux.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
     displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)

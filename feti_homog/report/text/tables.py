@@ -72,7 +72,7 @@ class Column:
 
     @property
     def head(self) -> str:
-        """Return the head of the column in text."""
+        """Return the column head for text tables."""
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:

@@ -28,7 +28,7 @@ def option_was_used(name: str) -> bool:
 
 
 def error_words(error: PETSc.Error) -> str:
-    """Return the last line of a PETSc error, without the rank: its fault."""
+    """Return the fault in a PETSc error: the last line, without the rank."""
     return str(error).splitlines()[-1].split("] ", 1)[-1]
 
 
