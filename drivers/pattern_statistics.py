@@ -113,7 +113,7 @@ def _translation_weights(pattern: FibrePattern, vectors: Float) -> Float:
 
 @dataclass(frozen=True)
 class Envelope:
-    """A function of a pattern beside those of n simulations.
+    """A function of a pattern beside the functions of n simulations.
 
     Attributes:
         low, high: (m,) least and largest values of the simulations; at one place a pattern of the model lies outside

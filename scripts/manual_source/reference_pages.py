@@ -37,7 +37,7 @@ def case_file() -> str:
     parts = [
         "# Case file",
         "A case file is TOML. `feti-homog keys` prints these tables after an index by need, `feti-homog keys WORD` "
-        "the keys and sections that have a word in them.",
+        "the keys and sections that contain a word.",
     ]
     for each in reference.tables():
         rows = [(code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]

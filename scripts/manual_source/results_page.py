@@ -10,39 +10,39 @@ from feti_homog.results.result_json import DescribedColumn, columns
 from feti_homog.studies.outputs import COLUMNS, STATISTICS_COLUMNS
 
 INTRODUCTION = """\
-Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.
+Any consistent units: stresses have the unit of the moduli in the case file, lengths have the unit of the cell.
 Orders and signs: [README](../README.md#units-order-and-signs). Words in capitals stand for names that vary."""
 
 JSON = """\
 All numbers are finite. `KEY[]` is a list, whose entries have the keys that follow. Keys without a value are absent."""
 
 HDF5 = """\
-n nodes, m elements, k interface nodes, f fibres; nodes are torn, each subdomain has its own. K is the number of a
-state, from 0: of a stiffness the unit strains, of a path the points whose numbers are `states` in result.json. Every
-dataset has the attributes `meaning` and `unit`; the unit is that of the case's labels, if it has them, and 1 of pure
-numbers.
+n nodes, m elements, k interface nodes, f fibres; nodes are torn: each subdomain has its own nodes. K is the number of
+a state, from 0. The states of a stiffness are the unit strains, the states of a path are the points whose numbers
+`states` in result.json lists. Every dataset has the attributes `meaning` and `unit`; the unit is the label in the case,
+if any, and 1 for pure numbers.
 
-In ParaView `result.xdmf` opens the cell and `interface.xdmf` the interface; there `displacement` is that of the fibre's
-face. The filter Python Annotation, of the field data, shows a state's label by
-`label.astype("u1").tobytes().decode()`, and its load factor by `load_factor`.
+In ParaView `result.xdmf` opens the cell and `interface.xdmf` the interface, with the `displacement` of the fibre's
+face. The filter Python Annotation, applied to the field data, shows a state's label by
+`label.astype("u1").tobytes().decode()`, and the load factor by `load_factor`.
 
-What follows from these fields is not stored: `feti-homog fields DIR` writes all states with fluctuations, strains, von
-Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView from 5.12 on), and with `--format vtu` as
-a `.vtu` for each state (meshio, too), which `cell.pvd` and `interface.pvd` list (PyVista). Their times are the numbers
-of the states, for load factors do not rise where a path snaps back; `load_factor`, `temperature`, `mean_strain` and
-`mean_stress` are field data. In Python `feti_homog.read_state(DIR, K)` returns all of them as arrays."""
+Fields that follow from these fields are not stored. `feti-homog fields DIR` writes all states with fluctuations,
+strains, von Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView from 5.12 on). With
+`--format vtu` it writes a `.vtu` for each state (also for meshio); `cell.pvd` and `interface.pvd` list these files
+(PyVista). Times are state numbers, because load factors fall where a path snaps back; `load_factor`, `temperature`,
+`mean_strain` and `mean_stress` are field data. In Python `feti_homog.read_state(DIR, K)` returns fields as arrays."""
 
 CASES_CSV = """\
-Of a sweep, a row for each case; results are there once `collect` has written them. i and j stand for 1, 2 or 3, in
-stiffnesses of generalized plane strain for 1 to 6."""
+The table of a sweep has a row for each case; `collect` writes the results. i and j stand for 1, 2 or 3, in stiffnesses
+of generalized plane strain for 1 to 6."""
 
 STATISTICS_CSV = """\
-A row for each point of a sweep and each output: the statistics of its finished realisations. Times, memory, checks and
-outputs that are zero in all cases have none."""
+A row for each point of a sweep and each output has the statistics of the finished realisations. Times, memory, checks
+and outputs that are zero in all cases have no row."""
 
 SPATIAL = """\
-Of generalized plane strain, result.h5 has all of the above but for what stands here again or is new. Fields do not vary
-along x3, but for the displacement E33 x3."""
+In generalized plane strain, result.h5 has all entries above; this table lists changed and new entries. Fields do not
+vary along x3, except for the displacement E33 x3."""
 
 
 def results() -> str:
