@@ -13,7 +13,7 @@ from pathlib import Path
 from support.jobs import mpirun
 
 from hostile import case_files, events, fibre_tables, fuzzer, meshes, processes, results
-from hostile.running import in_one_job, in_processes
+from hostile.running import in_one_job, in_processes, make
 
 # Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
 EVERY = {1: 1, 2: 5, 3: 11}
@@ -57,6 +57,8 @@ def tried(folder: Path, only: str) -> dict[str, list[str]]:
         tried_here = [a for a in shared[::step] if ranks == 1 or a.kind != events.FALSE_KIND]  # of one rank
         parts = (tried_here[k::AT_ONCE] for k in range(AT_ONCE)) if ranks == 1 else (tried_here,)
         jobs += [(part, ranks, folder / f"{ranks} ranks, {k}") for k, part in enumerate(parts) if part]
+    for part, _, place in jobs:
+        make(part, place)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         in_jobs = [pool.submit(in_one_job, *job) for job in jobs]
         found = in_processes(alone, folder / "processes", pool)

@@ -17,13 +17,17 @@ from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, entries
 MOST_TOLD = 1500  # characters of what a faulty attempt printed
 
 
+def make(attempts: Sequence[Attempt], folder: Path) -> None:
+    """Make the files of attempts, on the main thread, which gmsh needs."""
+    (folder / "cwd").mkdir(parents=True)
+    for number, attempt in enumerate(attempts):
+        attempt.make(folder / str(number))
+
+
 def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[str, list[str]]:
-    """Return the faults of attempts, one after the other on so many ranks, up to one that ends the job."""
+    """Return the faults of made attempts, one after the other on so many ranks, up to one that ends the job."""
     here = folder / "cwd"
-    here.mkdir(parents=True)
     places = [folder / str(number) for number in range(len(attempts))]
-    for attempt, place in zip(attempts, places, strict=True):
-        attempt.make(place)
     before = [entries(place) for place in places]
     commands = folder / "commands"
     commands.write_text(json.dumps([a.command(place) for a, place in zip(attempts, places, strict=True)]))

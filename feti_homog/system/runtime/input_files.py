@@ -17,7 +17,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 
 T = TypeVar("T")
 MOST_BYTES = 1 << 30
-PATIENCE = 300.0  # seconds
+PATIENCE, SPEED = 10.0, 1e5  # seconds, and bytes in a second
 STATM = Path("/proc/self/statm")
 
 
@@ -60,14 +60,15 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 
 
 def in_own_process(
-    path: Path, function: Callable[[Path], T], patience: float = PATIENCE, memory: int | None = None
+    path: Path, function: Callable[[Path], T], patience: float | None = None, memory: int | None = None
 ) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
     Raises:
         FetiHomogError: the function raises it.
-        CaseError: the process crashes, lacks memory, or takes longer than `patience` seconds.
+        CaseError: the process crashes, lacks memory, or takes longer than `patience` seconds (default: by file size).
     """
+    patience = PATIENCE + path.stat().st_size / SPEED if patience is None else patience
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 

@@ -43,6 +43,17 @@ def test_what_does_not_end_is_ended(tmp_path):
     os.close(ours)
 
 
+def test_the_clock_follows_from_the_size_of_the_file(tmp_path, monkeypatch):
+    """A connection is asked for the answer of a sparse file of 5 MB within 10 s, and 1 s more for each 0.1 MB."""
+    asked = []
+    monkeypatch.setattr("multiprocessing.connection.Connection.poll", lambda _, timeout: asked.append(timeout))
+    (tmp_path / "large").touch()
+    os.truncate(tmp_path / "large", 5_000_000)
+    with pytest.raises(CaseError, match="does not end within 60 s"):
+        in_own_process(tmp_path / "large", lambda _: signal.pause())
+    assert asked == [60.0]
+
+
 def test_more_memory_than_allowed_is_refused(tmp_path):
     assert in_own_process(tmp_path, lambda _: len(bytes(1 << 20)), memory=1 << 28) == 1 << 20
     with pytest.raises(CaseError, match="damaged, "):
