@@ -63,7 +63,7 @@ def verify(directory: Path) -> Certificate:
     """Check all laws on a result folder; raise CaseError, one line, if a file is unreadable."""
     # Damaged numbers may ask for any memory and time: the limits are five times the need of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
-    return input_files.in_own_process(directory, _verified, 10.0 + size / 1e5, (1 << 30) + 32 * size)
+    return input_files.in_own_process(directory, _verified, size, (1 << 30) + 32 * size)
 
 
 def _verified(directory: Path) -> Certificate:

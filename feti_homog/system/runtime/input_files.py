@@ -4,6 +4,7 @@ A library that may crash on a damaged file reads the file in a separate process.
 """
 
 import errno
+import math
 import multiprocessing
 import os
 import resource
@@ -17,7 +18,8 @@ from feti_homog.errors import CaseError, FetiHomogError
 
 T = TypeVar("T")
 MOST_BYTES = 1 << 30
-PATIENCE, SPEED = 10.0, 1e5  # seconds, and bytes in a second
+# Processor seconds for a small file, bytes read in a further second, and seconds to wait for a processor second.
+SECONDS, SPEED, PATIENCE = 10.0, 1e5, 30.0
 STATM = Path("/proc/self/statm")
 
 
@@ -59,16 +61,16 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
     return kind(f"cannot read {path}: {error.strerror or error}")
 
 
-def in_own_process(
-    path: Path, function: Callable[[Path], T], patience: float | None = None, memory: int | None = None
-) -> T:
+def in_own_process(path: Path, function: Callable[[Path], T], size: int | None = None, memory: int | None = None) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
+
+    Its processor time, which other processes hardly change, has a limit proportional to `size`, by default the file's.
 
     Raises:
         FetiHomogError: the function raises it.
-        CaseError: the process crashes, lacks memory, or takes longer than `patience` seconds (default: by file size).
+        CaseError: the process crashes, or lacks memory or time.
     """
-    patience = PATIENCE + path.stat().st_size / SPEED if patience is None else patience
+    seconds = SECONDS + (path.stat().st_size if size is None else size) / SPEED
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -78,10 +80,12 @@ def in_own_process(
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        most = {resource.RLIMIT_CPU: math.ceil(seconds)}
         if memory is not None:
-            limits, used = resource.getrlimit(resource.RLIMIT_AS), int(STATM.read_text().split()[0])
-            most = used * resource.getpagesize() + memory
-            resource.setrlimit(resource.RLIMIT_AS, (min({most, *limits} - {resource.RLIM_INFINITY}), limits[1]))
+            most[resource.RLIMIT_AS] = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
+        for kind, limit in most.items():
+            limits = resource.getrlimit(kind)
+            resource.setrlimit(kind, (min({limit, *limits} - {resource.RLIM_INFINITY}), limits[1]))
         try:
             sender.send(function(path))
         except FetiHomogError as error:
@@ -89,15 +93,16 @@ def in_own_process(
         except MemoryError as error:
             sender.send(CaseError(f"{path}: damaged, {error}"))
 
+    late = CaseError(f"{path}: damaged, reading does not end within {seconds:g} s")
     process = context.Process(target=send, daemon=True)
     process.start()
     sender.close()
     try:
-        if not receiver.poll(patience):
-            raise CaseError(f"{path}: damaged, reading does not end within {patience:g} s")
-        answer = receiver.recv()
+        answer = receiver.recv() if receiver.poll(PATIENCE * seconds) else late
     except EOFError:
-        raise CaseError(f"{path}: damaged, the library that reads it crashes") from None
+        process.join()
+        crash = CaseError(f"{path}: damaged, the library that reads it crashes")
+        answer = late if process.exitcode == -signal.SIGXCPU else crash
     finally:
         process.kill()
         process.join()

@@ -1,11 +1,13 @@
 """Files on which a library crashes, or does not come to an end, are reported in one line."""
 
 import os
+import resource
 import signal
 
 import pytest
 
 from feti_homog.errors import CaseError
+from feti_homog.system.runtime import input_files
 from feti_homog.system.runtime.input_files import in_own_process
 
 
@@ -33,25 +35,32 @@ def test_what_goes_wrong_is_reported(tmp_path, function, words):
         in_own_process(tmp_path, function)
 
 
-def test_what_does_not_end_is_ended(tmp_path):
+def wait(_):
+    signal.pause()
+
+
+def compute(_):
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(("function", "seconds"), [(wait, 0.0), (compute, 0.5)])
+def test_what_does_not_end_is_ended(tmp_path, monkeypatch, function, seconds):
     """A pipe ends when no process can write to it any more."""
+    monkeypatch.setattr(input_files, "SECONDS", seconds)
     ours, theirs = os.pipe()
-    with pytest.raises(CaseError, match="damaged, reading does not end"):
-        in_own_process(tmp_path, lambda _: signal.pause(), patience=0.0)
+    with pytest.raises(CaseError, match=f"damaged, reading does not end within {seconds:g} s"):
+        in_own_process(tmp_path, function, size=0)
     os.close(theirs)
     assert os.read(ours, 1) == b""
     os.close(ours)
 
 
-def test_the_clock_follows_from_the_size_of_the_file(tmp_path, monkeypatch):
-    """A connection is asked for the answer of a sparse file of 5 MB within 10 s, and 1 s more for each 0.1 MB."""
-    asked = []
-    monkeypatch.setattr("multiprocessing.connection.Connection.poll", lambda _, timeout: asked.append(timeout))
+def test_the_limit_follows_from_the_size_of_the_file(tmp_path):
+    """A sparse file of 5 MB has 10 s of the processor, and 1 s more for each 0.1 MB."""
     (tmp_path / "large").touch()
     os.truncate(tmp_path / "large", 5_000_000)
-    with pytest.raises(CaseError, match="does not end within 60 s"):
-        in_own_process(tmp_path / "large", lambda _: signal.pause())
-    assert asked == [60.0]
+    assert in_own_process(tmp_path / "large", lambda _: resource.getrlimit(resource.RLIMIT_CPU)[0]) == 60
 
 
 def test_more_memory_than_allowed_is_refused(tmp_path):
