@@ -69,11 +69,9 @@ class Rule:
                     matches.append((name, f"{place}.{step}" if place else step, parent[step]))
         faulty = (match for match in matches if not (match[2] is None or (self.holds and self.holds(match[2]))))
         for count, (section, place, value) in enumerate(faulty):
-            if count > MOST_FAULTS:  # others are only counted
-                yield f"[{section}] {place}"
-                continue
             words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
-            subject = f" {place} = {wording.toml_value(value)}" if place else ""
+            shown = wording.toml_value(value) if count <= MOST_FAULTS else ""  # others are only counted
+            subject = f" {place} = {shown}" if place else ""
             if self.names:
                 above, names = f"{place}." if place else "", [name for name in self.names if name in value]
                 subject = f" {', '.join(above + name for name in names or self.names)}"

@@ -56,9 +56,9 @@ def _require_layout(path: Path, file: Any) -> None:
     counts = {symbol: str((*(entry.shape or ()), 0)[0]) for symbol, entry in entries.items()}
     states = [f"state/{number}" for number in range(len(file.get("state", ())))]
     is_spatial = any("axial_stress" in file[state] for state in states)
-    parts = {"": field_layout.Header, "mesh": field_layout.MeshPart, "fibre": field_layout.FibrePart}
-    parts |= {"interface": field_layout.InterfacePart}
-    parts |= dict.fromkeys(states, field_layout.SpatialStatePart if is_spatial else field_layout.StatePart)
+    parts: dict[str, Any] = {"": field_layout.Header, "mesh": field_layout.MeshPart, "fibre": field_layout.FibrePart}
+    of_state = field_layout.SpatialStatePart if is_spatial else field_layout.StatePart
+    parts |= {"interface": field_layout.InterfacePart, **dict.fromkeys(states, of_state)}
     for group, part in parts.items():
         hints = get_type_hints(part)
         for name, d in records.descriptions(part).items():

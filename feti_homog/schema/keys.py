@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -118,7 +117,6 @@ def key(
     return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 
 
-@cache
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
     """Return the keys of a table class by name, without derived fields."""
     return {entry.name: entry.metadata["key"] for entry in dataclasses.fields(table_class) if "key" in entry.metadata}

@@ -93,10 +93,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 @contextlib.contextmanager
 def document_lock(directory: Path) -> Iterator[None]:
-    """Exclude other studies while one checks the folder and writes its document.  On one rank.
-
-    Raises CaseError if another process holds the lock for long; file systems may have no locks.
-    """
+    """Exclude other studies while one writes its document; raise CaseError if one lasts for long.  On one rank."""
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:
         try:

@@ -142,9 +142,8 @@ class Study(ABC):
                 if is_new:
                     atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
 
-        with output_folder.held(
-            directory, comm, lambda line: standard_streams.complain(line) if comm.rank == 0 else None
-        ):
+        say = standard_streams.complain if comm.rank == 0 else lambda line: None
+        with output_folder.held(directory, comm, say):
             mpi_errors.on_root(comm, begin)
             evaluator = Evaluator(directory, comm, size, retry, quiet)
             document = head | self.answer(evaluator) | {"warnings": evaluator.warnings}
