@@ -126,17 +126,13 @@ class Result:
     transverse_moduli: engineering_constants.TransverseModuli | None = described(
         "ranges of Young's and shear moduli across the fibres", default=None
     )
-    estimates: phase_bounds.Estimates | None = described(
-        "closed estimates of the same, without debonding", default=None
-    )
+    estimates: phase_bounds.Estimates | None = described("closed estimates, without debonding", default=None)
     fibre_bounds: phase_bounds.FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
     conductivity_estimates: phase_bounds.ConductivityEstimates | None = described(
         "closed forms of a conductivity, without debonding and voids", default=None
     )
     mesh_error: result_records.MeshErrors | None = described("estimated mesh errors of a stiffness", default=None)
-    sensitivities: cell_records.Sensitivities | None = described(
-        "derivatives of the results, if asked for", default=None
-    )
+    sensitivities: cell_records.Sensitivities | None = described("derivatives of the results, on request", default=None)
     tips: result_records.TipRates | None = described("energy release rates at tips of debonded arcs", default=None)
     angle: tuple[result_records.AnglePoint, ...] | None = described("points of `angle`, as in angle.csv", default=None)
     path: tuple[result_records.PathPoint, ...] | None = described("points of `path`, as in path.csv", default=None)

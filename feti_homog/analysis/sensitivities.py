@@ -27,8 +27,7 @@ def sensitivities(
         document: the entry `effective_conductivity`; or `effective_stiffness` and, if a temperature is a load,
             `thermal_stress`.
         responses: the responses to all unit loads.
-        one_sided: debonded faces touch without tension; each column is then differentiated with the faces fixed as
-            under its load.
+        one_sided: debonded faces touch without tension; each column is then differentiated with its faces fixed.
     """
     k, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
     if k is not None:

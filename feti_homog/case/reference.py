@@ -99,9 +99,7 @@ def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
         *map(_table, sections.TABLES),
         _table(sections.SectionTable(sections.UNKNOWN, f"[{sections.UNKNOWN}] SECTION.KEY", sections.Unknown)),
         _table(sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] NAME", sections.Measured)),
-        _table(
-            sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] {sections.CURVE}", sections.MeasuredCurve)
-        ),
+        _table(sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] curve", sections.MeasuredCurve)),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(sections.UNCERTAINTY, f"[{sections.UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),
@@ -154,9 +152,8 @@ def _table(table: sections.SectionTable, *rows: KeyRow) -> TableReference:
     meaning = " ".join(first_paragraph.split())
     if table.contents is material_forms.Isotropic:  # the first form
         meaning = f"{MATERIAL_MEANING} {meaning}"
-    return TableReference(
-        table.section, table.place, meaning, (*rows, *_rows(table.section, keys.keys_of(table.contents)))
-    )
+    rows = *rows, *_rows(table.section, keys.keys_of(table.contents))
+    return TableReference(table.section, table.place, meaning, rows)
 
 
 def _rows(section: str, keys: Mapping[str, keys.Key]) -> tuple[KeyRow, ...]:

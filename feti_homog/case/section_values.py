@@ -25,9 +25,8 @@ def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueT
 
     def accepts(value: Any) -> bool:
         is_table = isinstance(value, dict) and value != {}
-        return (
-            is_table and all(map(phase_names.FIBRE_PHASE.fullmatch, value)) and all(map(number.accepts, value.values()))
-        )
+        names_phases = is_table and all(map(phase_names.FIBRE_PHASE.fullmatch, value))
+        return names_phases and all(map(number.accepts, value.values()))
 
     return types.ValueType(
         f"a table by phase, other than matrix, coating and void, of {words}, such as {example}",

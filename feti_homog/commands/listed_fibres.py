@@ -135,10 +135,8 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
         )
         coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
         phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-        has_voids = coarse_mesh.voids(mesh) > 0
-        return ListedFibres(
-            mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), mesh.origin, has_voids
-        )
+        angles, has_voids = np.zeros(len(phases)), coarse_mesh.voids(mesh) > 0
+        return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, angles, mesh.origin, has_voids)
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size

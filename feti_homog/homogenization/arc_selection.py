@@ -115,9 +115,8 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
                 if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
                     continue
                 if fibre is not None and fibre not in fibres:
-                    kind = (
-                        "that can debond" if interface.between is None else f"between {' and '.join(interface.between)}"
-                    )
+                    phases = interface.between
+                    kind = "that can debond" if phases is None else f"between {' and '.join(phases)}"
                     lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"

@@ -216,9 +216,7 @@ def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
     """Add the moments and sums `pairs` (vertices, p, ..) of all pieces at shared vertices.  Collective."""
-    parts = [
-        np.concatenate([a[strip.shared], b[strip.shared]], axis=2) for strip, (a, b) in zip(strips, pairs, strict=True)
-    ]
+    parts = [np.concatenate([a[s.shared], b[s.shared]], axis=2) for s, (a, b) in zip(strips, pairs, strict=True)]
     totals = shared.sum([part.reshape(len(part), -1) for part in parts])
     for strip, (moments, sums), part, total in zip(strips, pairs, parts, totals, strict=True):
         p = moments.shape[1]

@@ -73,9 +73,8 @@ class CrackExtension:
         fraction = np.clip((reach - np.linalg.norm(offset, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
         total = u.reshape(-1, 2)[mesh.node_class[nodes]] + offset @ E
         moved, changed = fraction * ((offset + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
-        return point_fields.energy_change(
-            points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed
-        )
+        s = self.subdomain
+        return point_fields.energy_change(points, total, s.L[:3, :3], moved, changed, s.is_mixed)
 
 
 @dataclass(frozen=True)
@@ -213,12 +212,10 @@ class EnergyReleaseRates:
         The work is `closing_work` (t, 2) in opening and in shear.  A length is MODE_LENGTH times the
         radius, or the length of the element behind the tip if that is larger.
         """
-        smallest, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
-        work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
+        least, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
+        work, length = np.zeros((len(least), 2)), np.zeros(len(least))
         # Nodes of a chain within these lengths at most, and one element more.
-        counts = self._tree.query_ball_point(
-            in_cell(self.points[tips.node], self._period), smallest, return_length=True
-        )
+        counts = self._tree.query_ball_point(in_cell(self.points[tips.node], self._period), least, return_length=True)
         steps = order + int(counts.max(initial=1))
         chains = [self._chains.onward(tips.node, start, steps) for start in (tips.behind, tips.ahead)]
         for t, (behind, front) in enumerate(zip(*chains, strict=True)):
@@ -232,7 +229,7 @@ class EnergyReleaseRates:
                 np.linalg.norm(nearest_image(self.points[chain] - self.points[tips.node[t]], self._period), axis=1)
                 for chain in (behind, front)
             )
-            length[t] = max(smallest[t], to_behind[min(order, len(behind) - 1)])
+            length[t] = max(least[t], to_behind[min(order, len(behind) - 1)])
             work[t] = debonded_arcs.closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length
 

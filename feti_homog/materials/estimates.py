@@ -25,9 +25,7 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
     only the last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic
     about x3, nor an expansion if a phase has no expansion.
     """
-    if not all(
-        map(engineering_constants.is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])
-    ):
+    if not all(map(engineering_constants.is_transversely_isotropic, [matrix, *(f.constants for f in fibres)])):
         return Estimates(**dict.fromkeys(METHODS, NOTHING))
     return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
 

@@ -158,8 +158,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
-    Walpole 1969). The bound on k holds for a composite with square symmetry too. Raises ValueError if a phase is not
-    isotropic.
+    Walpole 1969). The bound on k holds for square symmetry, too.  Raises ValueError if a phase is not isotropic.
     """
     if not all(map(is_isotropic, stiffnesses)):
         raise ValueError("the Hashin-Shtrikman bounds hold for isotropic phases")

@@ -1,8 +1,7 @@
 """The coarse cell as a torus: node classes, torus edges and constituents.
 
 Two plane nodes that differ by a period form one class, and two boundary edges that differ by a period form one
-torus edge.  A constituent is a connected part of one phase on the torus: a fibre that the cell boundary cuts is
-one constituent.
+torus edge.  A constituent is a connected part of one phase on the torus: a fibre cut by the cell boundary is one.
 """
 
 from __future__ import annotations

@@ -203,8 +203,7 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     """Find the most suitable class for the pin.
 
     Returns:
-        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key; [] without
-        classes.
+        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key, if any.
     """
     mesh = torus.mesh
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period

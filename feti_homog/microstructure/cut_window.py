@@ -71,9 +71,7 @@ def _least_moves(outlines: Outlines, pairs: Float, moved: Float, size: Float) ->
     """
     centres, unit, count = outlines.centres, float(outlines.radii.mean()), len(pairs)
     ends = pairs[:, :2].T.astype(np.intp)
-    vector, present = (
-        places[ends[1]] - places[ends[0]] + pairs[:, 2:4] * size for places in (centres, centres + moved)
-    )
+    vector, present = (at[ends[1]] - at[ends[0]] + pairs[:, 2:4] * size for at in (centres, centres + moved))
     normal, reach = outlines.parting(ends[0], ends[1], present)
     fibres, place = np.unique(ends, return_inverse=True)
     matrix = np.zeros((2 * len(fibres) + 1, count))

@@ -102,9 +102,7 @@ def page(document: Document, directory: Path) -> str:
     }
     filled = {name: body for name, body in sections.items() if body}
     links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in filled)
-    body = "\n".join(
-        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in filled.items()
-    )
+    body = "\n".join(f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{t}\n</section>' for name, t in filled.items())
     verdict, run = "good" if status == "done" else "bad", f"{document['version']}, run of {document.get('date', '')}"
     return Template(files.joinpath("page.html").read_text(encoding="utf-8")).substitute(
         policy=POLICY, title=title, style=style, run=escape(run.removesuffix(", run of ")), verdict=verdict,

@@ -256,9 +256,7 @@ def refuse_others(directory: Path) -> None:
     for folder in (directory / FOLDER, directory / DROPPED):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
             kind = "link" if folder.is_symlink() else "file"
-            raise CaseError(
-                f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
-            )
+            raise CaseError(f"--out {directory}: {folder.name} is a {kind} there, and a run makes that folder")
         paths = list(folder.iterdir()) if folder.is_dir() else []
         foreign = [path.name for path in paths if path.name != NAME or not path.is_file()]
         if foreign:

@@ -183,16 +183,13 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     """Return the stress drops, and the strain jumps at constant load.
 
     A drop leads from a peak to the next valley.  On the first leg of an event path, a drop also leads from each load at
-    which bonds break to the next point that a rising load reaches.  A prescribed stress cannot drop: the strain jumps
-    instead.
+    which bonds break to the next point that a rising load reaches.  Under a prescribed stress the strain jumps.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
     largest = float(size.max())
-    threshold = LEAST_DROP * largest
-    entries = [
-        (float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, threshold)) if size[a] > size[b]
-    ]
+    least = LEAST_DROP * largest
+    entries = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
     per_strain = largest / (float(length.max()) or 1.0)
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + path_curves.SAME_LOAD).sum()) if legs else 0
@@ -207,7 +204,7 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     for a, b in pairwise([*starts.tolist(), len(load)]):
         jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
         later.append((jump, a, min(b, len(load) - 1)))
-    return entries + [drop for drop in later if drop[0] > threshold]
+    return entries + [drop for drop in later if drop[0] > least]
 
 
 def _norm(values: Float, shear: float) -> Float:

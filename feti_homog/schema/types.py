@@ -94,8 +94,7 @@ def list_of(
 ) -> ValueType:
     """Return the type of lists whose entries have the type `item`.
 
-    A list has at least `least` and at most `most` entries (0: any number), or exactly `count`; entries differ if
-    `unique`.
+    A list has at least `least` and at most `most` entries (0: any number), or exactly `count`; `unique` entries differ.
     """
     fewest, largest = (least, most or math.inf) if count is None else (count, count)
     expected += f", at most {most} of them" if most else ""

@@ -182,8 +182,7 @@ class CaseRunner:
         """Run a case unless it has finished or failed, or another process holds it.  Collective.
 
         The group waits `timeout` seconds for the lock of the case; `advance` shows the share of all cases.  Returns the
-        outcome, and the name of another process that holds the case.  Raises FetiHomogError if the folder cannot be
-        written.
+        outcome, and the name of another process that holds the case.  Raises FetiHomogError if it cannot write.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)

@@ -253,6 +253,5 @@ class Evaluations:
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]
         pairs = zip(documents, data, strict=False)  # other ranks have no results
-        return (
-            mpi_errors.on_root_only(comm, lambda: [Answer(result, predicted(result, y)) for result, y in pairs]) or []
-        )
+        answers = mpi_errors.on_root_only(comm, lambda: [Answer(r, predicted(r, y)) for r, y in pairs])
+        return answers or []

@@ -41,8 +41,7 @@ class Evaluator:
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.
 
-        Returns the contents of result.json for all cases on rank 0; an empty list elsewhere.  Raises ConvergenceError
-        if cases failed.
+        Returns result.json of all cases on rank 0; [] elsewhere.  Raises ConvergenceError if cases failed.
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)

@@ -155,9 +155,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     output |= SILENT
     case = cases_at(document, [{}], folder).cases[0]
     places = {name.partition(".")[0] for name in uncertainty.std}
-    if case.analysis.type in sections.DIFFERENTIABLE and (
-        places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std
-    ):
+    is_differentiable = case.analysis.type in sections.DIFFERENTIABLE
+    if is_differentiable and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
         output["sensitivities"] = True
     means = {name: number_at(document, tuple(name.split("."))) or 0.0 for name in uncertainty.std}
     study = ScatterStudy(document, folder, uncertainty, means, settings.realisations)

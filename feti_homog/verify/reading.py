@@ -43,8 +43,7 @@ class Mesh:
 class InterfaceRows:
     """The k interface nodes: points (k, 2), normals (k, 2) from fibre to matrix, tributary lengths (k,).
 
-    `fibre` (k,) counts from 1, `body` (k,) is the body of the fibre, `pair` (k,) the index of the section
-    [[interface]].
+    `fibre` (k,) counts from 1, `body` (k,) is the body of the fibre, `pair` (k,) the index of [[interface]].
     """
 
     points: Float

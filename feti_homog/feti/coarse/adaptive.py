@@ -6,8 +6,7 @@ With the coarse displacements Z_0 (`geneo.AveragedModes`) in equilibrium, the bo
 
 and the preconditioner is H_0 = B_D S_0 B_D^T.  As B Z_0 = 0, H_0 is the exact inverse of the dual operator if Z_0 spans
 all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes the soft modes from the Krylov
-method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite, and couples subdomains with a common
-neighbour.
+method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite, coupling neighbours of a subdomain.
 """
 
 from __future__ import annotations
@@ -115,8 +114,7 @@ class AdaptiveCoarseSpace:
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
         have no energy and get no equation; other modes may be linearly dependent.  A multiple eps I makes the matrix
-        definite: for a coarse displacement with scaled energy mu, S_0 keeps the fraction eps / (mu + eps) of the
-        forces.
+        definite: for a coarse displacement with scaled energy mu, S_0 keeps eps / (mu + eps) of the forces.
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.

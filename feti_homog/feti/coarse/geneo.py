@@ -5,8 +5,7 @@ With the soft modes in the coarse space, the largest eigenvalue of the precondit
 Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
 
 Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  B Z_0 = 0, because B B_D^T = I: so Z_0 are
-displacements of the cell with glued active rows.  A subdomain mode reaches only subdomains that share nodes with its
-subdomain.
+displacements of the cell with glued active rows.  A subdomain mode reaches the subdomain and its neighbours alone.
 """
 
 from collections.abc import Iterator, Sequence
@@ -72,8 +71,7 @@ class AveragedModes:
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
         """Compute the averaged modes Z_0 (boundary dofs, m) on local subdomain i.
 
-        The kernel of the subdomain, which has no energy, is left out: so the motion of a stiff subdomain keeps all
-        digits.
+        The kernel of the subdomain, which has no energy, is left out: so motions of stiff subdomains keep all digits.
 
         Args:
             BW: (rows, boundary dofs) scaled constraints W^-1 B D^-1 of the subdomain, on the active rows.

@@ -120,8 +120,7 @@ class InterfaceNeighbours:
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
         """Extend global rows (k,) by rows of adjacent nodes, until there are `enough` rows.
 
-        `choose` filters the candidates; the search goes from neighbour to neighbour and stops at the ends of
-        interfaces.
+        `choose` filters the candidates; the search goes from neighbour to neighbour, up to the ends.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

@@ -37,8 +37,7 @@ def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
     The strips run along x or y, have about half of the triangles (within STRIP_SLACK), and their boundaries have as few
-    edges as possible; the boundaries of two METIS parts on the torus are up to 50 % longer.  Returns None if a strip is
-    not connected.
+    edges as possible; boundaries of two METIS parts on the torus are up to 50 % longer.  None if a strip falls apart.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0

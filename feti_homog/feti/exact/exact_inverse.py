@@ -2,8 +2,7 @@
 
 Let Gamma be the response of a reference cell with active rows A (`reference_cell`), and C the rows that have changed
 since: their bonds broke, closed or softened.  `followed_response` updates the columns of C in the present response at
-every change.  With these columns, `reference_changes` turns any response of the reference cell into the present
-response.
+every change.  With these columns, `reference_changes` turns any response of the reference cell into the present one.
 
 When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
 factored as the new reference cell.  Where an update would lose too many digits, the cell is factored too, and columns

@@ -140,9 +140,8 @@ class FaceSystem:
         unbalanced = np.abs(status_system.residual(self.product(x), rows, free, slope))
         unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
         # Relative to the forces of the prescribed entries at a node and at its neighbours in S.
-        return (
-            status_system.largest_share(unbalanced, np.abs(rows) + self.terms(self.terms(fixed)), slope) <= UNBALANCED
-        )
+        sizes = np.abs(rows) + self.terms(self.terms(fixed))
+        return status_system.largest_share(unbalanced, sizes, slope) <= UNBALANCED
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """Return x (m,) with the prescribed entries, and the right-hand side (m,) in the load rows."""

@@ -289,9 +289,8 @@ class SlidingCell:
         traction, node = self.cell.traction([state.solution for state in states]), self._face_nodes
         largest = scales[0].over_interface(np.abs(traction).max(axis=1, initial=0.0))
         largest = np.max([largest, *(scale.bond_stress(of) for scale, of in zip(scales, acting, strict=True))], axis=0)
-        traction[node] -= (
-            np.hstack(jumps)[self._position] * self._springs[node] / self.interface.nodes.length[node, None]
-        )
+        forces = np.hstack(jumps)[self._position] * self._springs[node]
+        traction[node] -= forces / self.interface.nodes.length[node, None]
         excess = coulomb_errors(traction, self._mu, bonds.sliding_signs)
         excess = np.where((bonds.status == BONDED) & ~self._damaged, 0.0, excess)
         excess /= np.where(largest > 0.0, largest, 1.0)

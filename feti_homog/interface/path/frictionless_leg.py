@@ -145,9 +145,8 @@ class FrictionlessLeg(Leg):
             target, reached = max((start + self._bends_before) / 2, nearest), False
         before, after = self._mean, cell.macroscopic(end)
         ends = np.stack([self._response(before), self._response(after)])
-        largest = max(
-            np.abs(ends).max(), np.abs(cell.least_bonded_stress(np.stack([before.strain, after.strain]))).max()
-        )
+        least = cell.least_bonded_stress(np.stack([before.strain, after.strain]))
+        largest = max(np.abs(ends).max(), np.abs(least).max())
         off_line = max(cell.plane.scales.sign_noise, OFF_LINE_ROUNDING) * largest
         while True:
             way = (target - start) / (1.0 - start)

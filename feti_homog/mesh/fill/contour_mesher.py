@@ -26,8 +26,7 @@ from feti_homog.typing import Bool, Float, Int32
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
     """Mesh the regions of an image with phases (rows, columns) within smooth outlines.
 
-    A Gaussian filter, one pixel wide, removes the steps from an indicator; splines follow its contour at the level that
-    keeps the area.
+    A Gaussian filter, one pixel wide, removes the steps from an indicator; splines follow its contour of equal area.
 
     Raises:
         CaseError: scikit-image is not installed.

@@ -143,10 +143,8 @@ def _material(
     document: Document, symmetry: str, compliance: Float, expansion: Float | None, errors: Mapping[str, float]
 ) -> EffectiveMaterial:
     """Return a material with the name, version and unit of a result."""
-    case, version = document["case"], document["version"]
-    return EffectiveMaterial(
-        case["name"], version, case["output"]["stress_unit"], symmetry, compliance, expansion, errors
-    )
+    case, unit = document["case"], document["case"]["output"]["stress_unit"]
+    return EffectiveMaterial(case["name"], document["version"], unit, symmetry, compliance, expansion, errors)
 
 
 def require_done(document: Document) -> None:

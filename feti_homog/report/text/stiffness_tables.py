@@ -155,9 +155,7 @@ def constants(document: Document) -> list[Table]:
     sources: dict[str, Document] = {THIS_CELL: cell, ITS_ERROR: errors}
     sources |= {name.replace("_", " "): row for name, row in (estimates or {}).items()}
     sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
-    numbers = {
-        title: _known({n: row.get(n) for n in engineering_constants.ABOUT_FIBRES}) for title, row in sources.items()
-    }
+    numbers = {t: _known({n: row.get(n) for n in engineering_constants.ABOUT_FIBRES}) for t, row in sources.items()}
     names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in numbers.values())]
     rows = [
         [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]

@@ -1,7 +1,6 @@
 """Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects of any size.
 
-mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays in objects are sent in
-place.
+mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent in place.
 """
 
 from collections.abc import Callable

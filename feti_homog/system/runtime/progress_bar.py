@@ -41,8 +41,7 @@ class Progress:
     def stage(self, name: str) -> Iterator[list[str]]:
         """Time a block as a stage of the run and of PETSc's log, and print its time.
 
-        The block may append remarks to the list, which are printed with the time; the times of inner stages are
-        subtracted.
+        The block may append remarks to the list, which are printed with the time, less the times of inner stages.
         """
         remarks: list[str] = []
         start = time.perf_counter()
