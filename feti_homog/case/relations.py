@@ -68,9 +68,7 @@ def axes_lines(
 
     loaded = [name for load in section.placed.values() for name, value in load_sections.named(load).items() if value]
     of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)
-    phases = [
-        f"[material.{name}]" for name, material in materials.items() if isinstance(material, material_forms.Orthotropic)
-    ]
+    phases = [f"[material.{name}]" for name, m in materials.items() if isinstance(m, material_forms.Orthotropic)]
     lines = [f"[{kind}] {of_loads}"] if of_loads else []
     lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
     return (". ".join(lines),) if lines else ()

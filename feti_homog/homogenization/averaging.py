@@ -194,9 +194,8 @@ class Homogenization:
         """Return the friction work per area, which the cell does not store.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
-        work = float(state.solution.lam @ state.solution.jump) - coupled_interfaces.energy_beside_springs(
-            self.interface, state
-        )
+        work = float(state.solution.lam @ state.solution.jump)
+        work -= coupled_interfaces.energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:

@@ -159,9 +159,8 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
     # Envelopes with arcs need the inverse operator, which pays for many solves.
     many = case.section.is_followed or (has_arcs and case.section.breaks and by_energy)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
-    iterations = (
-        ITERATIONS_WITH_COATINGS if phase_names.COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
-    )
+    has_coatings = phase_names.COATING in case.materials and not across
+    iterations = ITERATIONS_WITH_COATINGS if has_coatings else ITERATIONS_OF_A_SOLVE
     return iterations * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 

@@ -194,9 +194,7 @@ class Evaluations:
         if estimates is not None and not estimates.misfits:
             return estimates
         if not self.evaluator.quiet:
-            standard_streams.say(
-                "remark: the search from the start fails; from the best of further points within the bounds:"
-            )
+            standard_streams.say("remark: the search from the start fails; the next begins at the best further point:")
         box = [
             Axis(path, ends=(u.lower, u.upper), log=u.lower > 0.0)
             for path, u in zip(self.fit.paths, unknowns, strict=True)
