@@ -113,7 +113,9 @@ def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSpri
 
     The springs of conduction are conductances.
     """
-    along = [(b.conductance or b.axial_stiffness or b.tangential_stiffness or math.inf,) for b in case.interfaces]
+    along = [
+        (bond.conductance or bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces
+    ]
     around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
     return jump_operator.InterfaceSprings(tuple(along if problem.components == 1 else around), has_softening(case))
 

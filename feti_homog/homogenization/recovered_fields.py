@@ -71,15 +71,15 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
     first, is_scalar = 0, voigt.PLANE_STATES[cell.case.analysis.plane].is_scalar
     components = [*voigt.IN_PLANE, 2] if cell.solver.problem.turns and cell.axial is None else [*range(6)]
     # Ranks without parts, too, begin with all problems, whose parts are collective: so strict.
-    for (phase, chunk, stress), *further in zip(*passes, strict=True):
-        for *_, more in further:
-            stress += more
+    for chunks in zip(*passes, strict=True):
+        phase, chunk = chunks[0][:2]
+        stress, without_noise = (sum(arrays) for arrays in zip(*(arrays for *_, arrays in chunks), strict=True))
         weights = chunk.weights / chunk.weights.sum(axis=1, keepdims=True)
         last = first + len(weights)
         means[:, components, first:last], first = (stress[:, components] * weights).sum(axis=-1), last
-        if not is_scalar and not np.isnan(stress).any():
+        if not is_scalar and not np.isnan(without_noise).any():
             places = in_cell(chunk.points.reshape(-1, 2), cell.summary.shift)[:, None]
-            for largest, tensors in zip(by_phase, stress.reshape(*stress.shape[:2], -1), strict=True):
+            for largest, tensors in zip(by_phase, without_noise.reshape(*stress.shape[:2], -1), strict=True):
                 largest[phase].append(_largest(_measures(cell.case.material_of(phase), tensors.T), places))
     by_state = zip(*cell.comm.allgather([*map(_joined, by_phase)]), strict=True)
     gathered = ({name: [rank[name] for rank in state if name in rank] for name in by_phase[0]} for state in by_state)
@@ -101,6 +101,16 @@ def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: P
     return NodalFields(np.concatenate(totals), lam[pair] / nodes.length[:, None], opening[pair])
 
 
+def error_shares(cell: TornCell, response: Response) -> Float:
+    """Return the contributions (e,) of elements to the error of E . Sigma; NaN without estimates.  Collective."""
+    shares = response.shares
+    if shares is None and cell.case.output.mesh_error:
+        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
+
+        shares = energy_errors(cell, [response]).shares[:, 0]
+    return np.full(sum(len(part.mesh.triangles) for part in cell.parts), np.nan) if shares is None else shares
+
+
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
     """Name the places at which stresses of plane states grow without limit on finer meshes."""
     corners = np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any()
@@ -112,7 +122,10 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(
     cell: TornCell, responses: Sequence[Response | None], out: Float
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
-    """Yield the phase, points and stresses (s, 6, e, q) of each chunk of elements; `out` (dofs, s) takes u*."""
+    """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; `out` (dofs, s) takes u*.
+
+    The second stresses have no rounding errors.
+    """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
     loads = all_loads[: len(cell.solver.problem.loads)]
@@ -132,9 +145,9 @@ def _stresses(
         recovery = stress_recovery.RecoveredStress.on(part.mesh, L, problem, u_of_part, loads, part.is_mixed)
         for chunk in recovery.elements:
             stress = rows @ chunk.stress.reshape(-1, m, len(at)).transpose(2, 1, 0) + constants.T[:, :, None]
-            everywhere = np.zeros((len(responses), *stress.shape[1:]))  # also in states without a response
-            everywhere[at] = np.where(np.abs(stress) < noise, 0.0, stress)
-            yield part.submesh.phase, chunk, everywhere.reshape(*everywhere.shape[:2], *chunk.weights.shape)
+            everywhere = np.zeros((2, len(responses), *stress.shape[1:]))  # also in states without a response
+            everywhere[:, at] = stress, np.where(np.abs(stress) < noise, 0.0, stress)
+            yield part.submesh.phase, chunk, everywhere.reshape(*everywhere.shape[:3], *chunk.weights.shape)
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:

@@ -104,7 +104,9 @@ def state_parts(
         response, stress = plane or axial, fields.stress[number]
         if response is None:
             raise ValueError("expected a response")
-        shares = [_shares(torn, r) for torn, r in ((cell, plane), (axial_cell, axial)) if r is not None]
+        shares = [
+            recovered_fields.error_shares(torn, r) for torn, r in ((cell, plane), (axial_cell, axial)) if r is not None
+        ]
         u = [x[:, number] for x in fields.displacement]
         problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
         in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
@@ -127,16 +129,6 @@ def state_parts(
             **common,
             **_at_nodes(cell, response, in_plane, along),
         )
-
-
-def _shares(cell: unit_cell.TornCell, response: averaging.Response) -> Float:
-    """Return the contributions (e,) of elements to the error of E . Sigma; NaN without estimates.  Collective."""
-    shares = response.shares
-    if shares is None and cell.case.output.mesh_error:
-        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
-
-        shares = energy_errors(cell, [response]).shares[:, 0]
-    return np.full(sum(len(part.mesh.triangles) for part in cell.parts), np.nan) if shares is None else shares
 
 
 def _at_nodes(

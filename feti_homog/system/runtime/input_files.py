@@ -18,8 +18,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 
 T = TypeVar("T")
 MOST_BYTES = 1 << 30
-# Processor seconds for a small file, bytes read in a further second, and seconds to wait for a processor second.
-SECONDS, SPEED, PATIENCE = 10.0, 1e5, 30.0
+SECONDS, SPEED = 10.0, 1e5  # of the processor for a small file, and bytes read in a further second
 STATM = Path("/proc/self/statm")
 
 
@@ -61,16 +60,18 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
     return kind(f"cannot read {path}: {error.strerror or error}")
 
 
-def in_own_process(path: Path, function: Callable[[Path], T], size: int | None = None, memory: int | None = None) -> T:
+def in_own_process(
+    path: Path, function: Callable[[Path], T], seconds: float | None = None, memory: int | None = None
+) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    Its processor time, which other processes hardly change, has a limit proportional to `size`, by default the file's.
+    Its processor time, which other processes hardly change, is at most `seconds`, by default in proportion to the file.
 
     Raises:
         FetiHomogError: the function raises it.
         CaseError: the process crashes, or lacks memory or time.
     """
-    seconds = SECONDS + (path.stat().st_size if size is None else size) / SPEED
+    seconds = SECONDS + path.stat().st_size / SPEED if seconds is None else seconds
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -98,7 +99,7 @@ def in_own_process(path: Path, function: Callable[[Path], T], size: int | None =
     process.start()
     sender.close()
     try:
-        answer = receiver.recv() if receiver.poll(PATIENCE * seconds) else late
+        answer = receiver.recv() if receiver.poll(30.0 * seconds) else late
     except EOFError:
         process.join()
         crash = CaseError(f"{path}: damaged, the library that reads it crashes")

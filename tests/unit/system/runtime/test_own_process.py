@@ -7,7 +7,6 @@ import signal
 import pytest
 
 from feti_homog.errors import CaseError
-from feti_homog.system.runtime import input_files
 from feti_homog.system.runtime.input_files import in_own_process
 
 
@@ -45,12 +44,11 @@ def compute(_):
 
 
 @pytest.mark.parametrize(("function", "seconds"), [(wait, 0.0), (compute, 0.5)])
-def test_what_does_not_end_is_ended(tmp_path, monkeypatch, function, seconds):
+def test_what_does_not_end_is_ended(tmp_path, function, seconds):
     """A pipe ends when no process can write to it any more."""
-    monkeypatch.setattr(input_files, "SECONDS", seconds)
     ours, theirs = os.pipe()
     with pytest.raises(CaseError, match=f"damaged, reading does not end within {seconds:g} s"):
-        in_own_process(tmp_path, function, size=0)
+        in_own_process(tmp_path, function, seconds)
     os.close(theirs)
     assert os.read(ours, 1) == b""
     os.close(ours)
