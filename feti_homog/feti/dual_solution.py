@@ -136,8 +136,7 @@ def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
     For displacements u = K+ f (boundary dofs, v), the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps
-    under forces as large as the rounding of K u.  Subdomains differ in scale: between stiff ones, a soft subdomain
-    moves far.
+    under forces as large as the rounding of K u.  Between stiff subdomains, a soft one moves far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

@@ -83,8 +83,7 @@ class PrimalTest:
     """PETSc's convergence test: two primal residuals must fall below rtol.
 
     The jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual is
-    |P H r| / |P M^-1 P d|, relative to the forces that close d.  A small dual residual can hide a large primal
-    residual.
+    |P H r| / |P M^-1 P d|, relative to the forces that close d.  Small dual residuals can hide large primal ones.
 
     Attributes:
         ends_on_stall: whether a stall is a breakdown.

@@ -55,8 +55,7 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
         alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (alpha_Tm + c nu_m E_f/E_A alpha_m),
 
-    where E, nu and alpha of a phase are axial values unless the index has a T.  Chamis 1984, for an isotropic
-    matrix.
+    where E, nu and alpha of a phase are axial values unless the index has a T.  Chamis 1984: isotropic matrix.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
         return NOTHING

@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.fem import GENERALIZED
 from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
-from feti_homog.materials import voigt
+from feti_homog.materials import laws, voigt
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
 from feti_homog.version import __version__
@@ -114,6 +114,7 @@ def state_parts(
         common |= {"mesh_error": _relative(np.sum(shares, axis=0), *responses), "stress_33": stress[2]}
         common["stress"] = stress[voigt.IN_PLANE].T
         if plane is not None and cell.axial is None:
+            common["stress_33"] = np.einsum("ev,ev->e", common["stress"], _rules_of_S33(cell))
             common |= _at_nodes(cell, response, in_plane)
             yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)
             continue
@@ -129,6 +130,12 @@ def state_parts(
             **common,
             **_at_nodes(cell, response, in_plane, along),
         )
+
+
+def _rules_of_S33(cell: unit_cell.TornCell) -> Float:
+    """Return the rows (e, 3) that give S33 in plane states from the in-plane stresses in each element."""
+    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane)[0] for s in cell.parts]
+    return np.repeat(np.reshape(rules, (-1, 3)), [len(s.mesh.triangles) for s in cell.parts], axis=0)
 
 
 def _at_nodes(

@@ -38,8 +38,7 @@ class Status(StrEnum):
     """The progress of a case.
 
     An UNCONVERGED case has a result that its checks refuse, a FAILED case an error instead of a result.  The result of
-    a DAMAGED case is unreadable or belongs to another case.  An INTERRUPTED case has events of a path, a WAITING case
-    has nothing.
+    a DAMAGED case is unreadable or belongs to another case.  An INTERRUPTED case has events, a WAITING case nothing.
     """
 
     DONE = "done"

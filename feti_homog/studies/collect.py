@@ -56,8 +56,10 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 def means(table: SweepTable) -> list[str]:
     """Return tables of peaks or constants: means over realisations with their scatter, or the values of points."""
-    names = [name for name in responses(table.finished[0]) if name in table.stated] if table.finished else []
-    names = [name for name in constant_tables.shown(names) if not re.match(r"C\d|onset", name)] or names
+    known = list(responses(table.finished[0])) if table.finished else []
+    names = [name for name in known if name in table.stated]
+    shown = constant_tables.shown(known) if "E1" in known else names
+    names = [name for name in names if name in shown and not re.match(r"C\d|onset", name)] or names
     columns = [tables.Column("output", -22), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
     columns += [tables.Column("std"), tables.Column("95 % +-")]
     lines, values = list[str](), list[list[Any]]()

@@ -62,8 +62,7 @@ def read(
     (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides (`snapped`).
 
     Raises:
-        MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
-            debonded lines.
+        MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides.
     """
     try:
         raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})

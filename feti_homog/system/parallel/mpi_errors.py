@@ -47,8 +47,7 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
     """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
 
     `function` must not communicate.  A rank raises its own defect.  Other ranks raise RemoteError for the first
-    rank with a defect or, without defects, the FetiHomogError of the first rank with one (NoMemoryError for a
-    MemoryError).
+    rank with a defect or, without defects, the first rank's FetiHomogError (NoMemoryError for a MemoryError).
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
 
