@@ -1,6 +1,7 @@
 """The solution of the dual problem under one load, and the jumps on active rows."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -119,6 +120,22 @@ class ActiveJumps:
         C, parts = self.operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
         rows = zip(*parts, strict=True)
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
+
+    def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
+        """Superpose solutions with equal active rows, multiplied by factors; `d` is as in `completed`."""
+        triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
+        strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
+        total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
+        amplitudes = [solution.alpha for solution in solutions if solution.alpha is not None]
+        if len(amplitudes) < len(solutions):
+            return total
+        alpha = np.stack(amplitudes, axis=1) @ factors
+        torn = self.natural.project(self.active.restrict(d @ strain))
+        pairs = np.stack([torn, self.active.restrict(jump)])
+        scale, residual = np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ij,ij->i", pairs, pairs)))
+        iterations, reason = max(s.iterations for s in solutions), min(s.reason for s in solutions)
+        residual = float(residual / (scale or 1.0))
+        return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
         """Compute F lambda for a solution of the present state, which adds alpha.

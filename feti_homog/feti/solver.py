@@ -52,7 +52,7 @@ class FetiSolver:
         natural: rigid-body motions, G and P.
         adaptive: coarse space of the preconditioner, or None.
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
-        active: rows that carry multipliers.
+        active, jumps: rows that carry multipliers, and the jumps there.
         solves: loads solved so far.
         condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
         method: names of preconditioner and coarse space for the summary.
@@ -87,13 +87,14 @@ class FetiSolver:
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
             process_memory.trim()
         self.active = ActiveRows(self.rows)
-        self._jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
+        self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None
         if self.exact_inverse is not None:
             from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
 
-            self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self._jumps)
-        self._closure: Float | None = None
+            self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self.jumps)
+        # Without given Sigma on the sides E is the load, without solutions.
+        self._closure, self._units = np.eye(len(problem.loads)), list[DualSolution]()
         self._view = PETSc.Options("feti_").getBool("view", False)
         # Shell contexts call Python, so the solver destroys them: PETSc finalizes after the interpreter has shut down.
         self._krylov: dict[int, Krylov] = {}
@@ -166,7 +167,7 @@ class FetiSolver:
             self.natural.activate(active)
         if change:
             self.preconditioner.activate(active)
-            self._closure = None
+            self._units = []
 
     @cached_property
     def _pushes(self) -> Float:
@@ -186,18 +187,15 @@ class FetiSolver:
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """
-        if self._closure is None:
-            v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
-            closure = np.eye(v)
-            if n > v:
-                free = self.natural.unconstrained_modes[self.natural.owned_modes].T @ self._pushes
-                largest = self.comm.allreduce(np.abs(self._pushes).max(initial=0.0), MPI.MAX)
-                if np.abs(self.comm.allreduce(free)).max(initial=0.0) > np.sqrt(np.finfo(float).eps) * largest:
-                    raise NotCarriedError('[cell] boundary = "traction": it pulls at bodies that have no bonds')
-                solutions = self.solve_many(np.eye(n), np.zeros((self.rows, n)))
-                kept = np.stack([self.stress_integral(solution)[v:] for solution in solutions], axis=1)
-                closure = np.vstack([closure, np.linalg.solve(kept[:, v:], -kept[:, :v])])
-            self._closure = closure
+        v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
+        if n > v and not self._units:
+            free = self.natural.unconstrained_modes[self.natural.owned_modes].T @ self._pushes
+            largest = self.comm.allreduce(np.abs(self._pushes).max(initial=0.0), MPI.MAX)
+            if np.abs(self.comm.allreduce(free)).max(initial=0.0) > np.sqrt(np.finfo(float).eps) * largest:
+                raise NotCarriedError('[cell] boundary = "traction": it pulls at bodies that have no bonds')
+            self._units = self.solve_many(np.eye(n), np.zeros((self.rows, n)))
+            kept = np.stack([self.stress_integral(unit)[v:] for unit in self._units], axis=1)
+            self._closure = np.vstack([np.eye(v), np.linalg.solve(kept[:, v:], -kept[:, :v])])
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
@@ -208,7 +206,8 @@ class FetiSolver:
         """Solve the dual problems for k loads together.  Collective.
 
         One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
-        With influence columns, raises as `InfluenceSolutions.record`.
+        With tractions on the sides, the solutions that gave `closure` superpose.  With influence columns, raises as
+        `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
@@ -217,6 +216,8 @@ class FetiSolver:
         k, columns = len(strains), None if self.is_pulled else self._by_columns
         if strains.shape[1] == len(self.problem.loads):
             strains = strains @ self.closure.T
+            if self._units:
+                return [self.jumps.superposed(self._units, loads, self.d) for loads in strains]
         self.solves += k
         if columns is not None and (solutions := columns.solutions(strains, self.d)) is not None:
             return solutions
@@ -225,11 +226,11 @@ class FetiSolver:
         if self.is_pulled:
             balance = self.natural.balancing(-self._pushes @ strains.T)
             torn_jump -= self.operator.apply(balance)
-        torn = self._jumps.norms(torn_jump)
-        right = self._jumps.projected(torn_jump)
-        jump = self._jumps.norms(right)
+        torn = self.jumps.norms(torn_jump)
+        right = self.jumps.projected(torn_jump)
+        jump = self.jumps.norms(right)
         # A load without a jump on the active rows has no multipliers.
-        rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
+        rounding = self.jumps.rounding(self._torn_displacement, strains.T, jump, torn)
         has_jump = jump > rounding
         scale = np.where(has_jump, jump, 1.0)
         right = np.where(has_jump, right, 0.0) / scale
@@ -237,7 +238,7 @@ class FetiSolver:
         closing = forces(right) if columns is None else columns.closing(self.d, E, has_jump / scale)
         closing = self.natural.project(closing)
         krylov.test.jump_scale = float(np.sqrt(has_jump.sum()))
-        krylov.test.force_scale = float(np.linalg.norm(self._jumps.norms(closing)))
+        krylov.test.force_scale = float(np.linalg.norm(self.jumps.norms(closing)))
         starts = np.where(has_jump, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
@@ -248,14 +249,14 @@ class FetiSolver:
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
         parts = lam * scale + balance, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
-        solutions = self._jumps.solutions(strains, *parts)
+        solutions = self.jumps.solutions(strains, *parts)
         if columns is not None:
             columns.record(solutions if has_jump.all() else [], self.d)
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
         """Return the solution with alpha; a solution that lacks alpha must belong to the present state.  Collective."""
-        return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
+        return solution if solution.alpha is not None else self.jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
         """Compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective.
@@ -293,7 +294,7 @@ class FetiSolver:
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for `columns` load cases; the first call sets it up."""
         if columns not in self._krylov:
-            parts = self.jump_operator.vector, self.preconditioner, self._jumps, columns
+            parts = self.jump_operator.vector, self.preconditioner, self.jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)
             self._shells.callback(self._krylov[columns].destroy)
         return self._krylov[columns]

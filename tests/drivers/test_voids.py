@@ -1,4 +1,4 @@
-"""The drivers of voids, coated fibres and closed estimates meet theory, and their results obey every law."""
+"""The drivers of voids, coats, estimates and windows meet theory, and their results obey every law."""
 
 import csv
 
@@ -54,4 +54,20 @@ def test_cells_lie_where_theory_wants_them(tmp_path):
         a, b = (value[name] for name in ("hexagonal", "random"))
         assert abs(a["E_axial"] / b["E_axial"] - 1.0) < 1e-3
     assert np.isnan(column([found["chamis"]], "G_axial")).sum() == 0
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))
+
+
+def test_bounds_of_windows_close_in_on_the_periodic_cell(tmp_path):
+    options = ("--sizes", "1", "2", "--mesh-size", "0.4", "--fields")
+    job = mpirun(2, ROOT / "drivers/window_size.py", "--out", tmp_path, *options)
+    assert job.returncode == 0, job.stderr
+    rows = [line.split() for line in job.stdout.splitlines() if "." in line]
+    table = {tuple(row[:-2]): np.array(row[-2:], float) for row in rows}
+    periodic, gaps = table["periodic",], []
+    for n in ("1", "4"):
+        low, high = table[n, "traction"], table[n, "displacement"]
+        assert (low < 1.01 * periodic).all() and (high > 0.99 * periodic).all()
+        gaps.append(high - low)
+    assert (gaps[1] < 0.8 * gaps[0]).all()
+    assert imread(tmp_path / "window_size.png")[..., :3].std() > 0.05
     assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))

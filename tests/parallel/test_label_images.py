@@ -14,7 +14,10 @@ from feti_homog import Case, run
 from feti_homog.analysis.runner import compute
 from feti_homog.verify.certificate import verify
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
+
+# In pieces, of which several ranks have interface nodes.
+SPRUNG = {"interface": SPRINGS, "decomposition": {"subdomains": 40}}
 
 
 def solved(comm, path, cell=None, **sections):
@@ -32,7 +35,7 @@ def saved(comm, path, image):
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "displacement", "traction"])
-@pytest.mark.parametrize("sections", [{}, {"interface": SPRINGS}], ids=["bonded", "springs"])
+@pytest.mark.parametrize("sections", [{}, SPRUNG], ids=["bonded", "springs"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, seed, sections, boundary):
     image = (np.random.default_rng(seed).random((16, 16)) < 0.4).astype(np.uint8)
@@ -105,7 +108,7 @@ def test_ranks_agree_and_files_obey_every_law(comm, shared_path):
     path = saved(comm, shared_path / "image.npy", image)
     for name, cell in {"steps": {}, "smooth": {"smooth": True, "mesh_size": 0.1}}.items():
         document = {"geometry": "pixels", "file": str(path), "labels": {"0": "matrix", "1": "fibre"}, **cell}
-        case = Case.parse(RUN | {"cell": document, "interface": SPRINGS})
+        case = Case.parse(RUN | {"cell": document} | SPRUNG)
         together = run(case, comm, out=shared_path / name).effective_stiffness
         alone = compute(case, MPI.COMM_SELF).effective_stiffness
         assert np.abs(together - alone).max() < 1e-9 * alone.max()

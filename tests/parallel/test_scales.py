@@ -13,8 +13,8 @@ from support.loads import strains
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
+from feti_homog.feti.dual_solution import ActiveJumps
 from feti_homog.feti.exact.exact_inverse import ExactInverse
-from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
@@ -130,12 +130,12 @@ def loaded_along(bonded):
 
 
 def test_a_stress_that_is_missed_beside_a_far_larger_one_is_no_result(comm, monkeypatch):
-    superposed = mixed_load.superposed
+    superposed = ActiveJumps.superposed
 
-    def lose_the_third(solver, solutions, factors):
-        return superposed(solver, solutions, factors * (np.arange(len(factors)) != 2))
+    def lose_the_third(jumps, solutions, factors, d):
+        return superposed(jumps, solutions, factors * (np.arange(len(factors)) != 2), d)
 
-    monkeypatch.setattr(mixed_load, "superposed", lose_the_third)
+    monkeypatch.setattr(ActiveJumps, "superposed", lose_the_third)
     with pytest.raises(ConvergenceError, match="check stress"):
         run(loaded_along(True), comm)
 

@@ -14,29 +14,29 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs and their messages, further starts of fits; the third: conductivity, images, boundaries.
+# begun runs and their messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 60 + 125,
+    "analysis": 3000 + 115 + 125,
     "case": 2880 + 25 + 120,
     "commands": 560 + 10 + 130,
     "fem": 1150 + 3 + 11,
-    "feti": 6300 + 0 + 65,
-    "homogenization": 3230 + 40 + 20,
-    "interface": 4000 + 0 + 5,
+    "feti": 6300 + 0 + 75,
+    "homogenization": 3230 + 42 + 20,
+    "interface": 4000 + 0 - 15,
     "materials": 1430 + 52 + 135,
     "mesh": 5500 + 0 + 255,
     "microstructure": 2140 + 0 + 25,
     "report": 3420 + 150 + 124,
-    "results": 2430 + 95,
+    "results": 2430 + 110,
     "schema": 430 + 0 + 5,
-    "studies": 2950 + 50,
-    "system": 1770 + 3,
+    "studies": 2950 + 55,
+    "system": 1770 + 8,
     "verify": 3100 + 150 + 120,
 }
-FILES, TOTAL = 310, 45000 + 320 + 1132
+FILES, TOTAL = 310, 45000 + 368 + 1132
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 6.2, 6.0
+CALLED_ONCE, IMPORTS = 6.3, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
 CONSTANTS, SHARED = 340, 217
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.

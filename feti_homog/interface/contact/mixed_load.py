@@ -4,9 +4,6 @@ With fixed active rows the response is linear: the solutions under the prescribe
 superpose, with factors that meet the stresses.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
@@ -51,7 +48,8 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     factors = solver.comm.bcast(answer)
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
-    return superposed(solver, solutions, np.concatenate([np.ones(len(solutions) - len(unknown)), factors]))
+    factors = np.concatenate([np.ones(len(solutions) - len(unknown)), factors])
+    return solver.jumps.superposed(solutions, factors, solver.d)
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
@@ -71,20 +69,3 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     # The eigenvalues are squares of sizes.
     undetermined[unknown] = (np.abs(vectors[:, values < NEGLIGIBLE**2]) > NEGLIGIBLE).any(axis=1)
     return np.asarray(solver.comm.bcast(undetermined))
-
-
-def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
-    """Superpose solutions with equal active rows, multiplied by factors.  Collective."""
-    triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
-    strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
-    total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
-    amplitudes = [solution.alpha for solution in solutions if solution.alpha is not None]
-    if len(amplitudes) < len(solutions):
-        return total
-    alpha = np.stack(amplitudes, axis=1) @ factors
-    torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
-    pairs = np.stack([torn, solver.active.restrict(jump)])
-    scale, residual = np.sqrt(distributed_arrays.allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
-    iterations, reason = max(s.iterations for s in solutions), min(s.reason for s in solutions)
-    residual = float(residual / (scale or 1.0))
-    return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
