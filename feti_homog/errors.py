@@ -26,8 +26,7 @@ def escaped(text: str, allowed: str = "") -> str:
 class FetiHomogError(Exception):
     """An error printed for the user, one line per fault, without a traceback.
 
-    Longer lines than LONGEST_LINE keep their beginning and the last KEPT_END characters.  Faults beyond MOST_FAULTS are
-    only counted, with those that caught errors have counted.
+    Lines beyond LONGEST_LINE keep their beginning and last KEPT_END characters; faults beyond MOST_FAULTS are counted.
     """
 
     exit_code = ExitCode.DEFECT
@@ -36,9 +35,8 @@ class FetiHomogError(Exception):
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]
         room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # one more is as short as the count
-        more = sum(counts.values()) + max(len(lines) - room, 0)
+        more, end = sum(counts.values()) + max(len(lines) - room, 0), LONGEST_LINE - KEPT_END - 3
         lines[room:] = [f"and {more} more faults"] if more else []
-        end = LONGEST_LINE - KEPT_END - 3
         # The reason stands at the end of a line.
         self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in map(escaped, lines))
         super().__init__("\n".join(self.faults))

@@ -72,8 +72,7 @@ class FetiSolver:
     ) -> None:
         """Factor the subdomains and the coarse problem.  Collective.
 
-        `applications`, the expected number of products with F, and `recovers` are as in `factory.build`, which also
-        states the exceptions.
+        `applications`, the expected number of products with F, `recovers`, and exceptions are as in `factory.build`.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)

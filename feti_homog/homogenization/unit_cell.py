@@ -240,8 +240,7 @@ def assemble_subdomains(
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
 
-    Returns the part of the cell on this rank, its entities shared with other ranks, the lattice, and the subdomains.
-    Raises as `tear`.
+    Returns the part of the cell on this rank, its shared entities, the lattice and the subdomains.  Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:

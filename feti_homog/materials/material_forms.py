@@ -80,8 +80,7 @@ class Isotropic:
 class Orthotropic:
     """Engineering constants along the material axes, of which axis 3 is x3; nu_ij = -eps_j/eps_i under stress along i.
 
-    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12 and G12, plane strain also E3, nu13 and nu23, generalized
-    plane strain all.
+    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12, plane strain also E3, nu13, nu23, generalized all.
     """
 
     E1: float = stress("Young's modulus along axis 1.")

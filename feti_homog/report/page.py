@@ -89,7 +89,7 @@ def page(document: Document, directory: Path) -> str:
             texts[f"Material card, {form}"] = export.card_of(document, form)
     texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
     *cards, case = (
-        f"<details><summary>{name}</summary>\n<pre>{escape(text)}</pre></details>" for name, text in texts.items()
+        f"<details><summary>{name}</summary>\n<pre>{escape(t)}</pre></details>" for name, t in texts.items()
     )
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),

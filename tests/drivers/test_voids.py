@@ -59,7 +59,7 @@ def test_cells_lie_where_theory_wants_them(tmp_path):
 
 def test_bounds_of_windows_close_in_on_the_periodic_cell(tmp_path):
     options = ("--sizes", "1", "2", "--mesh-size", "0.4", "--fields")
-    job = mpirun(2, ROOT / "drivers/window_size.py", "--out", tmp_path, *options)
+    job = standing_job(2).run(ROOT / "drivers/window_size.py", "--out", tmp_path, *options)
     assert job.returncode == 0, job.stderr
     rows = [line.split() for line in job.stdout.splitlines() if "." in line]
     table = {tuple(row[:-2]): np.array(row[-2:], float) for row in rows}

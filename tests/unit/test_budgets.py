@@ -14,7 +14,7 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs and their messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries.
+# begun runs, messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries.
 LINES = {
     ".": 470,
     "analysis": 3000 + 115 + 125,

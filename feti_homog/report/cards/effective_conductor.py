@@ -1,7 +1,6 @@
 """Material cards for an effective conductivity, in card axes (axis 1 along the fibre).
 
-Abaqus Keywords Guide and CalculiX CrunchiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS Material
-Reference: KXX, KYY, KZZ.
+Abaqus Keywords Guide and CalculiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS: KXX, KYY, KZZ.
 """
 
 import numpy as np
