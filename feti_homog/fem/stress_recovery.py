@@ -147,8 +147,8 @@ class RecoveredStress:
         stress = (self.L[:m, :m] @ strain.reshape(m, -1)).reshape(m * k, -1)
         stress += (self.L[:m] @ self.loads).reshape(-1, 1)
         points = np.stack([row.sum(axis=0) / 3 for row in (x, y)], axis=1)
-        stress = np.ascontiguousarray(stress.T).reshape(-1, 1, m, k)
-        return ElementStresses(part, points[:, None], doubled[:, None] / 2, stress)
+        ordered = np.ascontiguousarray(stress.T).reshape(-1, 1, m, k)
+        return ElementStresses(part, points[:, None], doubled[:, None] / 2, ordered)
 
     @cached_property
     def fits(self) -> Float:
