@@ -153,5 +153,5 @@ def test_a_folder_of_others_is_refused(tmp_path, name, content):
 @pytest.mark.parametrize(("make", "kind"), [(Path.touch, "file"), (lambda path: path.symlink_to("."), "link")])
 def test_a_checkpoint_that_is_no_folder_is_refused(tmp_path, make, kind):
     make(tmp_path / "checkpoint")
-    with pytest.raises(CaseError, match=f"checkpoint is a {kind} there, and a run makes a folder of that name"):
+    with pytest.raises(CaseError, match=f"checkpoint is a {kind} there, and a run makes that folder"):
         refuse_others(tmp_path)
