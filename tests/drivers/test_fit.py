@@ -6,8 +6,7 @@ import re
 import pytest
 from support.command_line import command_line
 from support.hooks import KILL, WAIT, Hook, HookedJob, hooked
-from support.jobs import ROOT
-from support.standing_jobs import standing_job
+from support.jobs import ROOT, mpirun
 
 COMMIT = "feti_homog.results.atomic:commit"
 # Before the lock under which a study checks its folder and writes its document.
@@ -156,7 +155,7 @@ TRUTH = {
 
 @pytest.mark.parametrize("driver", TRUTH)
 def test_estimates_are_what_the_data_were_made_of(tmp_path, driver):
-    job = standing_job(1).run(ROOT / f"drivers/{driver}.py", "--out", tmp_path, "--quick")
+    job = mpirun(0, ROOT / f"drivers/{driver}.py", "--out", tmp_path, "--quick")
     assert job.returncode == 0, job.stderr
     rows = re.findall(r"^(\w[\w ]*?) +[\d.]+ +([\d.]+)(?: +\S+)?$", job.stdout, re.MULTILINE)
     found = {name: float(value) for name, value in rows}

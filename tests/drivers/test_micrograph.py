@@ -6,10 +6,9 @@ import re
 import numpy as np
 from matplotlib.image import imread
 from support.command_line import assert_verified
-from support.jobs import ROOT
+from support.jobs import ROOT, mpirun
 from support.made_micrograph import text
 from support.moved_rows import moved_rows
-from support.standing_jobs import standing_job
 
 from feti_homog.microstructure.fibre_table import read_table
 
@@ -27,7 +26,7 @@ def test_the_table_is_that_of_the_script():
 def test_the_driver_prints_and_draws(tmp_path):
     (tmp_path / "t.csv").write_text(TABLE)
     words = ["--out", tmp_path / "out", "--quick", "--fields", "--table", tmp_path / "t.csv"]
-    job = standing_job(1).run(ROOT / "drivers/micrograph.py", *words)
+    job = mpirun(0, ROOT / "drivers/micrograph.py", *words)
     assert job.returncode == 0, job.stderr
     assert re.search(r"^fibres 6, fraction 0\.\d+; C11", job.stdout, re.MULTILINE)
     with (tmp_path / "out/micrograph.csv").open(newline="") as stream:

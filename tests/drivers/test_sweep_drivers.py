@@ -7,15 +7,12 @@ import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import assert_verified
-from support.jobs import ROOT
-from support.standing_jobs import standing_job
+from support.jobs import ROOT, mpirun
 from support.sweep_files import means
 
 
 def driven(name, folder, *options):
-    job = standing_job(2).run(
-        ROOT / f"drivers/{name}.py", "--out", folder, "--quiet", "--ranks-per-case", "1", *options
-    )
+    job = mpirun(2, ROOT / f"drivers/{name}.py", "--out", folder, "--quiet", "--ranks-per-case", "1", *options)
     assert job.returncode == 0, job.stderr
     return job.stdout
 
@@ -54,9 +51,7 @@ def test_representative_cell_prints_what_scatters(tmp_path):
 
 
 def test_effective_stiffness_prints_errors_below_2e_5(tmp_path):
-    job = standing_job(2).run(
-        ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fields", "--fractions", "0.2", "0.4"
-    )
+    job = mpirun(2, ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fields", "--fractions", "0.2", "0.4")
     assert job.returncode == 0, job.stderr
     rows = re.findall(r"^(square|hexagonal) +(strain|stress) (.*)$", job.stdout, re.MULTILINE)
     assert len(rows) == 4
@@ -71,7 +66,7 @@ def test_effective_stiffness_prints_errors_below_2e_5(tmp_path):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_iterations_prints_a_row_for_every_refinement(tmp_path, ranks):
     words = ["--out", tmp_path, "--refine", "0", "1", "--mesh-size", "0.1", "--fields"]
-    job = standing_job(ranks).run(ROOT / "drivers/iterations.py", *words)
+    job = mpirun(ranks, ROOT / "drivers/iterations.py", *words)
     assert job.returncode == 0, job.stderr
     rows = [line.replace(",", "").split() for line in job.stdout.splitlines()[1:]]
     assert [row[0] for row in rows] == ["0", "1"]
@@ -81,8 +76,8 @@ def test_iterations_prints_a_row_for_every_refinement(tmp_path, ranks):
 
 @pytest.mark.parametrize("driver", ["effective_stiffness", "iterations"])
 def test_help_ends_with_0_and_faults_with_2(tmp_path, driver):
-    job = standing_job(2).run(ROOT / f"drivers/{driver}.py", "--help")
+    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--help")
     assert job.returncode == 0 and job.stdout.count("usage:") == 1
-    job = standing_job(2).run(ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")
+    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")
     assert job.returncode == 2 and job.stderr.count("[cell] mesh_size = 7.0: expected a number") == 1
     assert not (tmp_path / "new").exists()

@@ -6,13 +6,12 @@ import numpy as np
 from matplotlib.image import imread
 from support.command_line import assert_verified
 from support.drivers import column, driven
-from support.jobs import ROOT
-from support.standing_jobs import standing_job
+from support.jobs import ROOT, mpirun
 
 
 def test_voids_soften_as_mori_and_tanaka_say(tmp_path):
     """From below, as for stiff fibres, by less than a fifth; all folders are verified."""
-    job = standing_job(1).run(ROOT / "drivers/voids.py", "--out", tmp_path / "out", "--quick", "--fields")
+    job = mpirun(0, ROOT / "drivers/voids.py", "--out", tmp_path / "out", "--quick", "--fields")
     assert job.returncode == 0, job.stderr
     with (tmp_path / "out/voids.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -26,7 +25,7 @@ def test_voids_soften_as_mori_and_tanaka_say(tmp_path):
 
 
 def test_the_driver_meets_composite_cylinders(tmp_path):
-    job = standing_job(1).run(ROOT / "drivers/coated_fibres.py", "--out", tmp_path / "out", "--quick", "--fields")
+    job = mpirun(0, ROOT / "drivers/coated_fibres.py", "--out", tmp_path / "out", "--quick", "--fields")
     assert job.returncode == 0, job.stderr
     with (tmp_path / "out/coated_fibres.csv").open(newline="") as stream:
         ratio, bulk, cylinders, shear, inner, outer = np.array(list(csv.reader(stream))[1:], float).T
@@ -59,7 +58,7 @@ def test_cells_lie_where_theory_wants_them(tmp_path):
 
 def test_bounds_of_windows_close_in_on_the_periodic_cell(tmp_path):
     options = ("--sizes", "1", "2", "--mesh-size", "0.4", "--fields")
-    job = standing_job(2).run(ROOT / "drivers/window_size.py", "--out", tmp_path, *options)
+    job = mpirun(2, ROOT / "drivers/window_size.py", "--out", tmp_path, *options)
     assert job.returncode == 0, job.stderr
     rows = [line.split() for line in job.stdout.splitlines() if "." in line]
     table = {tuple(row[:-2]): np.array(row[-2:], float) for row in rows}

@@ -1,13 +1,10 @@
 """Runs of the command line for the tests of it."""
 
-import re
-from collections.abc import Sequence
 from pathlib import Path
 
 from feti_homog.verify.certificate import verify
 from support.base_case import BASE
 from support.jobs import mpirun
-from support.standing_jobs import standing_job
 
 COMMAND = ("-m", "feti_homog")
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
@@ -21,20 +18,8 @@ def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
 
 
 def command_line(ranks: int, *words: str | Path):
-    """`python -m feti_homog words...` on so many ranks; none: without mpirun.
-
-    Options of PETSc, which starts once, have a process of their own.
-    """
-    return command_process(ranks, *words) if has_options(words) else standing_job(max(ranks, 1)).run(*COMMAND, *words)
-
-
-def command_process(ranks: int, *words: str | Path):
-    """Run `command_line` by processes of its own."""
+    """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
     return mpirun(ranks, *COMMAND, *words)
-
-
-def has_options(words: Sequence[str | Path]) -> bool:
-    return any(re.match("-[a-z]", str(word)) for word in words)
 
 
 def assert_verified(*folders: Path) -> None:

@@ -6,13 +6,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.image import imread
 
-from support.jobs import ROOT
-from support.standing_jobs import standing_job
+from support.jobs import ROOT, mpirun
 
 
 def driven(name: str, folder: Path, *options: str, ranks: int = 1) -> list[dict[str, str]]:
     """Run a driver and return its table; what all do on several ranks is in one module."""
-    job = standing_job(ranks).run(ROOT / f"drivers/{name}.py", "--quick", "--out", folder, *options)
+    job = mpirun(ranks, ROOT / f"drivers/{name}.py", "--quick", "--out", folder, *options)
     assert job.returncode == 0, job.stderr
     assert job.stdout.split()[-2:] == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
     picture = imread(folder / f"{name}.png")
