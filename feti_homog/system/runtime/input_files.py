@@ -99,7 +99,7 @@ def in_own_process(
     process.start()
     sender.close()
     try:
-        answer = receiver.recv() if receiver.poll(30.0 * seconds) else late
+        answer = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
     except EOFError:
         process.join()
         crash = CaseError(f"{path}: damaged, the library that reads it crashes")

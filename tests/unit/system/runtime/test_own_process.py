@@ -59,6 +59,8 @@ def test_the_limit_follows_from_the_size_of_the_file(tmp_path):
     (tmp_path / "large").touch()
     os.truncate(tmp_path / "large", 5_000_000)
     assert in_own_process(tmp_path / "large", lambda _: resource.getrlimit(resource.RLIMIT_CPU)[0]) == 60
+    os.truncate(tmp_path / "large", 1 << 40)
+    assert in_own_process(tmp_path / "large", lambda _: 0) == 0  # a clock of years
 
 
 def test_more_memory_than_allowed_is_refused(tmp_path):
