@@ -34,9 +34,9 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def point(given: argparse.Namespace, comm: Intracomm, ratio: float) -> list[float]:
-    """Return the constants of one coating, `ratio` times as stiff as the matrix.
+    """Compute moduli and onsets for a coating whose stiffness is `ratio` times the matrix stiffness.
 
-    They are the bulk modulus, the bulk modulus of composite cylinders, the shear modulus, and S11 at the onset of
+    Returns the bulk modulus, the bulk modulus of composite cylinders, the shear modulus, and S11 at the onset of
     debonding within and around the coating.
     """
     coating = {"young": ratio * MATRIX["young"], "poisson": COATING_POISSON}
@@ -61,7 +61,7 @@ def point(given: argparse.Namespace, comm: Intracomm, ratio: float) -> list[floa
 def solved(
     given: argparse.Namespace, comm: Intracomm, coating: dict[str, float], analysis: str, name: str, **sections: Any
 ) -> Result:
-    """Return the result of one analysis of the cell with a coating, in a folder `name`."""
+    """Run an analysis of the coated cell in the folder `name`, and return its result."""
     document = {
         "name": f"{name} {coating['young']:g}",
         "cell": {

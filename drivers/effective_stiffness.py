@@ -45,7 +45,7 @@ def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, plane: str, fraction: float) -> Any:
-    """Return L^ef (3, 3) of one cell; its results go to a separate folder."""
+    """Compute L^ef (3, 3) of a cell, and write its results to a separate folder."""
     name = f"{geometry}_{plane}_{round(100 * fraction)}"
     document: dict[str, Any] = {
         "name": name,

@@ -1,4 +1,4 @@
-"""Debonding of one fibre by energy: a size effect that a strength alone cannot show.
+"""Debonding by energy of a single fibre, whose onset stress depends on its radius.
 
     mpirun -n 2 .venv/bin/python drivers/energy_debonding.py --out results/energy_debonding
 
@@ -46,7 +46,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def onset(given: argparse.Namespace, comm: Intracomm, radius: float) -> Onset:
-    """Return the onset of one fibre: the first break and the debond that follows at once."""
+    """Compute the first break at a fibre of this radius, and the debond that follows at once."""
     exact = exact_onset(radius)
     stiffness = solved(given, comm, radius, analysis={"type": "stiffness", "plane": "strain"}).effective_stiffness
     strain = np.linalg.solve(np.array(stiffness), [1.5 * exact, 0.0, 0.0])

@@ -44,7 +44,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 def solved(
     given: argparse.Namespace, comm: Intracomm, analysis: str, keep_fields: bool = False, **sections: Any
 ) -> Result:
-    """Return the result of one analysis of the window."""
+    """Run an analysis of the window, and return its result."""
     document = {
         "name": analysis,
         "cell": {

@@ -130,7 +130,7 @@ class Envelope:
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
-    """Return the same fibres at other places, found like random cells (`relax`).
+    """Place the fibres of a pattern at random, as in random cells (`relax`).
 
     No gap is smaller than the smallest gap of the pattern.  A window is treated as a periodic cell.
 
@@ -155,7 +155,7 @@ def envelope(
     count: int,
     seed: int = 0,
 ) -> Envelope:
-    """Return a function (m,) of a pattern beside `count` simulations, all estimated in the same way.
+    """Compare a function (m,) of a pattern with the same function of `count` simulated patterns.
 
     The test by the largest deviation is exact: under the model all the functions are exchangeable [Ripley 1977].
     """

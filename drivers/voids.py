@@ -55,7 +55,7 @@ def row(given: argparse.Namespace, comm: Intracomm, share: float) -> list[float]
 def solved(
     given: argparse.Namespace, comm: Intracomm, share: float, seed: int, analysis: str, **sections: Any
 ) -> Result:
-    """Return the result of one analysis of one cell, in a separate folder."""
+    """Run an analysis of a cell in a separate folder, and return its result."""
     name = f"{analysis}-{share:g}-{seed}"
     document = {
         "name": name,

@@ -11,16 +11,8 @@ from typing import Any
 
 from feti_homog.results import path_curves
 
-LOADS = (
-    "strain",
-    "stress",
-    "temperature",
-    "to",
-    "waypoints",
-    "first_break_strain",
-    "first_break_stress",
-    "stress_left",
-)
+LOADS = ("strain", "stress", "temperature", "to", "waypoints", "first_break_strain", "first_break_stress",
+         "stress_left")  # fmt: skip
 ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
             "toughness", "G_I", "G_II")  # fmt: skip
 POWERS = dict.fromkeys(LOADS, 1) | dict.fromkeys(ENERGIES, 2)

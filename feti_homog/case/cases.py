@@ -268,7 +268,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
 @lru_cache
 def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str | None], ...]) -> list[Rule]:
-    """Return the rules for these sections whose conditions hold; the same for all cases of a sweep."""
+    """Select the rules for the sections `names` whose conditions `selected` meets."""
     rules = (rule for rule in RULES if not rule.path or rule.path[0] in names)
     return [rule for rule in rules if all(condition.holds(dict(selected)) for condition in rule.when)]
 

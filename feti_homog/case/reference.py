@@ -93,13 +93,13 @@ def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
     Raises:
         CaseError: nothing has the word, and no lines of `results` describe it.
     """
-    ranges = _rows(sections.SWEEP, sections.RANGE_KEYS)
+    ranges, measured = _rows(sections.SWEEP, sections.RANGE_KEYS), f"[{sections.MEASURED}]"
     references = [
         TableReference("name", "before the first section", "the case as a whole.", (NAME,)),
         *map(_table, sections.TABLES),
         _table(sections.SectionTable(sections.UNKNOWN, f"[{sections.UNKNOWN}] SECTION.KEY", sections.Unknown)),
-        _table(sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] NAME", sections.Measured)),
-        _table(sections.SectionTable(sections.MEASURED, f"[{sections.MEASURED}] curve", sections.MeasuredCurve)),
+        _table(sections.SectionTable(sections.MEASURED, f"{measured} NAME", sections.Measured)),
+        _table(sections.SectionTable(sections.MEASURED, f"{measured} {sections.CURVE}", sections.MeasuredCurve)),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(sections.UNCERTAINTY, f"[{sections.UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),

@@ -20,7 +20,7 @@ class PointFields:
         gradients, weights: gradients (e, q, a, 2) of the shape functions, a bubble last, and weights (e, q).
         u: (e, a, 2) displacements, in mixed elements also of the bubble.
         strain, stress: (e, q, 3) strains and stresses.
-        density: (e, q) strain energy density: sigma : eps / 2, in mixed elements and p (div u - p / lambda) / 2.
+        density: (e, q) strain energy density: sigma : eps / 2, plus p (div u - p / lambda) / 2 in mixed elements.
     """
 
     gradients: Float

@@ -33,10 +33,10 @@ class RecoveredFields:
     """The displacements and stresses of s states on this rank, and the largest stresses on all ranks.
 
     Attributes:
-        displacement: of each problem, u* (dofs, s) of the parts; 0 without a response.
+        displacement: u* (dofs, s) of the parts in each problem; 0 without a response.
         stress: (s, 6, e) means over the elements, as `voigt.SPATIAL_STRESSES`; fluxes as shear along the fibres.
-        largest: of each state, the largest stresses in each phase.  The principal stress is the largest one, signed;
-            the hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
+        largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
+            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
     """
 
     displacement: list[Float]
@@ -46,10 +46,10 @@ class RecoveredFields:
 
 @dataclass(frozen=True)
 class NodalFields:
-    """The nodal fields of one problem in one state, with c displacements per node.
+    """The nodal fields of a state in the plane or the axial problem, with c displacements per node.
 
-    Attributes: the `displacement` H y + u* (n, c), Eq. (14), at the plane nodes of the parts, and `traction` and
-    `jump` (k, c) at interface nodes.
+    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the plane nodes of the parts; `traction` and `jump` (k, c)
+    at the interface nodes.
     """
 
     displacement: Float
@@ -73,7 +73,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
     # Ranks without parts, too, begin with all problems, whose parts are collective: so strict.
     for chunks in zip(*passes, strict=True):
         phase, chunk = chunks[0][:2]
-        stress, without_noise = (sum(arrays) for arrays in zip(*(arrays for *_, arrays in chunks), strict=True))
+        stress, without_noise = sum(stresses for *_, stresses in chunks)
         weights = chunk.weights / chunk.weights.sum(axis=1, keepdims=True)
         last = first + len(weights)
         means[:, components, first:last], first = (stress[:, components] * weights).sum(axis=-1), last
@@ -122,9 +122,9 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(
     cell: TornCell, responses: Sequence[Response | None], out: Float
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
-    """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; `out` (dofs, s) takes u*.
+    """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; write u* to `out` (dofs, s).
 
-    The second stresses have no rounding errors.
+    In the second array rounding errors are zero.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))

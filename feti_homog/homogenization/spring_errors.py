@@ -33,7 +33,7 @@ class SpringSides:
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
         rows = jumps.nodes.bodies[:, 1], jumps.nodes.points, jumps.nodes.normal
-        fibre, self._points, self._normal = (np.concatenate(of) for of in zip(*self._comm.allgather(rows), strict=True))
+        fibre, self._points, self._normal = (np.concatenate(a) for a in zip(*self._comm.allgather(rows), strict=True))
         number, first = neighbours.node_numbers(jumps), 0
         # The nodes (order + 1,) of each side, the normals (q, 2) at Gauss points, whose length is the arc length per
         # unit of the arc parameter, and the turn.

@@ -20,7 +20,8 @@ Multipliers = tuple[Float, ...]
 class Macroscopic:
     """The macroscopic strains E, with temperature changes, and their work conjugates Sigma.
 
-    E.Sigma is an energy per cell area.  With fixed bonds the cell stores E.Sigma / 2; E'.Sigma = E.Sigma' (Betti).
+    E.Sigma is an energy per cell area.  With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two
+    states (Betti).
 
     Attributes:
         strain, stress: (n,) E and Sigma.

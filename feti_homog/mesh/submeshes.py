@@ -203,7 +203,8 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     """Find the most suitable class for the pin.
 
     Returns:
-        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key, if any.
+        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key; [] without
+        classes.
     """
     mesh = torus.mesh
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period

@@ -54,7 +54,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     """Extract the uncertain numbers from a document, in which their means remain."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
-        faults.append(f"{sections.UNCERTAINTY} = {wording.toml_value(table)}: expected [{sections.UNCERTAINTY}]")
+        name = sections.UNCERTAINTY
+        faults.append(f"{name} = {wording.toml_value(table)}: expected a section [{name}]")
         return Uncertainty({})
     stds = toml_files.leaves({name: value for name, value in table.items() if name != sections.CORRELATION})
     given = [(path, value) for path, value in stds if value != {}]

@@ -1,4 +1,4 @@
-"""Check the fields of one state: averages, equilibrium, interfaces, friction, and the largest stresses of phases."""
+"""Check the laws of a state: averages, equilibrium, interfaces, friction and the largest phase stresses."""
 
 from collections.abc import Mapping
 from typing import Any

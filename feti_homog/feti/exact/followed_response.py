@@ -172,7 +172,7 @@ class FollowedResponse:
         return B is not None
 
     def _turn(self, rows: Int, sign: Float, gain: Float, pivot: float) -> bool:
-        """Update for rows that become inactive (sign 1) or active (-1); return `follow`.  Collective.
+        """Update for rows that become inactive (sign 1) or active (-1); False as `follow`.  Collective.
 
         Pins on which a new active row exerts a force become inactive.
         """

@@ -62,7 +62,8 @@ def read(
     (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides (`snapped`).
 
     Raises:
-        MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides.
+        MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
+            debonded lines.
     """
     try:
         raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})

@@ -81,7 +81,7 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
 
     On a disc, the angle between two bridges, or between a bridge and a vertex among `vertices`, is at least
     LEAST_ANGLE; the shorter of two close bridges stays.  Good triangles near a cell side need room: the distance from
-    the sides is more than `margin` at the ends of a bridge, and in the middle more than `largest` or the bridge length.
+    the sides is more than `margin` at the ends of a bridge, and in the middle more than min(`largest`, bridge length).
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))

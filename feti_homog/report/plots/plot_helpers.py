@@ -188,7 +188,8 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
     """Choose the colour range of a field.
 
-    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A uniform field has one.
+    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
+    one colour.
 
     Returns:
         colour range, and the ends of the range beyond which values lie.

@@ -18,7 +18,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 
 T = TypeVar("T")
 MOST_BYTES = 1 << 30
-SECONDS, SPEED = 10.0, 1e5  # of the processor for a small file, and bytes read in a further second
+LEAST_SECONDS, BYTES_A_SECOND = 10.0, 1e5  # of processor time in which a child process reads a file
 STATM = Path("/proc/self/statm")
 
 
@@ -65,13 +65,13 @@ def in_own_process(
 ) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    Its processor time, which other processes hardly change, is at most `seconds`, by default in proportion to the file.
+    The processor time of the child is at most `seconds`, by default proportional to the file size.
 
     Raises:
         FetiHomogError: the function raises it.
         CaseError: the process crashes, or lacks memory or time.
     """
-    seconds = SECONDS + path.stat().st_size / SPEED if seconds is None else seconds
+    seconds = LEAST_SECONDS + path.stat().st_size / BYTES_A_SECOND if seconds is None else seconds
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -99,6 +99,7 @@ def in_own_process(
     process.start()
     sender.close()
     try:
+        # On a busy machine processor time takes longer; `poll` accepts 2e6 s at most.
         answer = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
     except EOFError:
         process.join()
