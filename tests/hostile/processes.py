@@ -15,14 +15,15 @@ BROKEN = changed(("fibre_fraction = 0.4", "fibre_fraction = 1.4"))
 BIG = changed(("mesh_size = 0.05", "mesh_size = 0.003"), end="[output]\npictures = false\n")
 NOBODY = "setpriv --reuid=65534 --regid=65534 --clear-groups"
 RUN, IN_OUT = "feti run c.toml --out out", "feti run ../c.toml --out ."
-QUIET_MPI = "mpirun -q --oversubscribe"
+# Without the blocks between two lines that mpirun prints after its ranks.
+QUIET_MPI = "{{ mpirun --oversubscribe {} 2>&1 1>&3 | sed '/^---/,/^---/d' >&2; exit ${{PIPESTATUS[0]}}; }} 3>&1"
 # A file system in memory of so many bytes or files; it ends with the shell, which has its own.
 DISK = "mkdir out/disk && mount -t tmpfs -o {} none out/disk && "
 LIMITS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     "little memory": (f"ulimit -v 800000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
     "very little memory": (f"ulimit -v 100000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
     "little memory of a rank": (
-        f"{QUIET_MPI} -n 1 feti run c.toml --out out : -n 1 bash -c 'ulimit -v 800000; feti run c.toml --out out'",
+        QUIET_MPI.format(f"-n 1 {RUN} : -n 1 bash -c 'ulimit -v 800000; {RUN}'"),
         "rank 1: the memory (ulimit -v)",
         (1,),
     ),
@@ -132,10 +133,11 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
     for name, words in {"reports": "report", "plots": "plot"}.items():
         shell = rf'feti {words} out & feti {words} out && wait $! && [ -z "$(ls out | grep "[.]part\$")" ]'
         yield Attempt("two at once", name, (), "", made, (0,), shell)
-    shell = f"{QUIET_MPI} -n 2 feti check broken.toml"
+    shell = QUIET_MPI.format("-n 2 feti check broken.toml")
     yield Attempt("ranks", "a faulty case", (), "fibre_fraction = 1.4", files, (2,), shell)
     if os.geteuid() == 0:
-        for name, (shell, expected, codes) in OTHERS.items():
+        others_enter = all(folder.stat().st_mode & 1 for folder in Path(sys.executable).parents)
+        for name, (shell, expected, codes) in OTHERS.items() if others_enter else ():
             words = shell.format(f"{NOBODY} feti")
             yield Attempt("other users", name, (), expected, made, codes, f"chmod 755 . ; {words}")
         for name, (shell, expected, codes) in ON_DISKS.items():
