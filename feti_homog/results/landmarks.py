@@ -52,6 +52,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
     points, component = path_curves.leading_points(document), path_curves.leading_component(document)
+    before = len(path_curves.leading_points(document, ("broke", "softened")))
     # The sum with 0.0 turns -0.0 into 0.0.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
     number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
@@ -61,7 +62,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
         fallen = stress[records[1:]] * load[records[:-1]] / load[records[1:]]
         curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
         number = np.r_[records[0], np.repeat(records[1:], 2)]
-    size = np.abs(curve)
+    # Compression after tension is no peak of the tension.
+    size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
     _, top, valley = max(falls, default=(0.0, len(size), None))
@@ -97,8 +99,9 @@ def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> l
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the stress fall after the peak, to the valley or the last leading point, divided by the largest stress."""
-    last = stresses_of(document, peak)[len(path_curves.leading_points(document)) - 1]
+    """Return the stress fall after the peak, to the valley or the end of its leg, divided by the largest stress."""
+    leg = path_curves.legs_of(document)
+    last = stresses_of(document, peak)[np.flatnonzero(leg == leg[peak["event"]])[-1]]
     remaining = (last, peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 

@@ -54,19 +54,19 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Return the component with the largest strain on the `leading_points`, among those that the waypoints change.
+    """Return the component with the largest strain up to the end of the leg on which damage begins.
 
-    If the waypoints change only the temperature, all components are compared.
+    Components that the waypoints change are compared, all if they change only the temperature.
     """
-    largest = np.abs([point["strain"] for point in leading_points(document)]).max(axis=0)
+    largest = np.abs([point["strain"] for point in leading_points(document, ("broke", "softened"))]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
     return changed[int(largest[changed].argmax())]
 
 
-def leading_points(document: Document) -> list[Point]:
-    """Return the points up to the end of the leg on which the first bond breaks; all points without a break."""
-    leg, broke = legs_of(document), np.array([point["broke"] > 0 for point in document["path"]])
-    return [*document["path"][: int((leg <= leg[broke].min(initial=np.inf)).sum())]]
+def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
+    """Return the points up to the end of the leg on which bonds first have `counts`; all points without."""
+    leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
+    return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:

@@ -45,11 +45,14 @@ class DeformedCell(drawn_cell.DrawnCell):
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Choose one stress component and one colour range for all given states.
 
-        The case may name the component; otherwise the component suits all states.
+        The case may name the component; otherwise the component suits all states, or a path its peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
-        component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
-        mark_of = landmarks.marks(document) if reported(document).is_followed else {}
+        component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
+        if reported(document).is_followed:
+            mark_of, peak = landmarks.marks(document), landmarks.peak_of(document)
+            component = peak["stress_name"] if component == "auto" and peak["stress"] else component
+        component = plot_helpers.stress_component(component, states)
         stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
         colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
         if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
@@ -96,10 +99,10 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; only a bar for the end of a path has a title."""
+        """Draw the colour bar of the shapes beside the axes; two bars have titles."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
-        bar.ax.set_title("" if is_common else "end")
+        bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")
         bar.locator = MaxNLocator(6)
 
     @property

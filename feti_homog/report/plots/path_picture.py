@@ -18,7 +18,7 @@ MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # of landmarks
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 ROUND = (1, 2, 5, 10)  # steps of ticks
-UNLOADED = np.linspace(0.0, 1.0, 16, endpoint=False)  # fractions of the first load, before the first point
+STEPS = np.linspace(0.0, 1.0, 17)  # fractions of the way from one point to the next
 # Colours of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
@@ -48,8 +48,7 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}")
     lower.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt.voigt_names(strains.shape[1])[0][component]]}$")
     title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
-    titles = title, document.get("unfinished"), *plot_helpers.bond_limits(case)
-    upper.set_title("\n".join(filter(None, titles)))
+    upper.set_title("\n".join(filter(None, (title, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
         axes.plot(strain, [point["temperature"] for point in points], color="0.3", linewidth=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
@@ -62,14 +61,13 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
     curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
-    for title, mark in MARKS.items():
-        if f"{title}event" in peak:
-            name = title.replace("_", " ").strip() or landmarks.name_of(document, peak)
-            bond = "" if narrow else landmarks.bond_of(peak, title).replace(" degrees", "°")
-            label = f"{name} {peak[f'{title}stress']:.4g} {unit}".rstrip() + f"\n{bond}".rstrip()
-            place = peak[f"{title}strain"], peak[f"{title}stress"]
-            # Smaller marks lie above the star of the same point.
-            upper.plot(*place, mark, ms=13 if mark == "*" else 7, zorder=5 + (mark != "*"), **star, label=label)
+    for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
+        titles = [title for title in MARKS if peak.get(f"{title}event") == event]
+        names = [title.replace("_", " ").strip() or landmarks.name_of(document, peak) for title in titles]
+        bond = "" if narrow else landmarks.bond_of(peak, titles[-1]).replace(" degrees", "°")
+        label = f"{' and '.join(names)} {peak[f'{titles[-1]}stress']:.4g} {unit}".rstrip() + f"\n{bond}".rstrip()
+        place = peak[f"{titles[-1]}strain"], peak[f"{titles[-1]}stress"]
+        upper.plot(*place, mark := MARKS[titles[-1]], ms=13 if mark == "*" else 7, zorder=6, **star, label=label)
     upper.margins(y=0.12)  # room for numbers
     for axes in (upper, *middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
@@ -221,14 +219,23 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
     """Return the values of an entry along the path, from the unloaded cell onwards.
 
     Up to the first point, and between the points `rising` of a rising load, the response is proportional to the load:
-    elastic energies grow with its square, and losses are constant.
+    elastic energies grow with its square, and losses are constant.  On other paths stresses and strains are linear
+    between points, and the elastic energies quadratic.
     """
     values = np.array([float(point.get(name) or 0.0) for point in points])
     load = np.array([point["load_factor"] for point in points])
     power = {"load_factor": 1, "leading": 1, "work": 2, "stored": 2, "stored_in_springs": 2}.get(name, 0)
     if rising is None:
-        return np.append(values[0] * UNLOADED ** max(power, 1), values)
+        rise, steps = np.diff(values)[:, None], STEPS[1:]
+        fields = [np.diff([point[field] for point in points], axis=0) for field in ("stress", "strain")]
+        bend = np.zeros((len(rise), 1)) if power < 2 else 0.5 * np.prod(fields, axis=0).sum(axis=1, keepdims=True)
+        if name == "stored_in_springs":
+            sums = [np.array(column[:-1]) + column[1:] for column in (values, [point["stored"] for point in points])]
+            bend *= (sums[0] / np.maximum(sums[1], np.finfo(float).tiny))[:, None]
+        between = values[:-1, None] + rise * steps - bend * steps * (1.0 - steps)
+        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # between distant points
+        return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
     values, load = values[rising], load[rising]
     start = np.append(0.0, load[:-1] / load[1:])
-    steps = start[:, None] + (1.0 - start[:, None]) * np.linspace(0.0, 1.0, 9)
+    steps = start[:, None] + (1.0 - start[:, None]) * STEPS
     return np.asarray(values[:, None] * steps**power).ravel()

@@ -17,18 +17,20 @@ ROWS = 15  # of the table
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
 
-    Columns: leading strain, stresses that waypoints name or that act, temperature, strains under prescribed stresses.
+    Columns: strains that waypoints drive, stresses that they name or that act, temperature, other strains.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
     strains, stresses = voigt.voigt_names(strain.shape[1])
     leading = path_curves.leading_component(document)
     visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
-    varying = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(visible)}
-    if any(point.get("temperature") for point in points):
-        varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
     prescribed = {name for target in path_curves.targets(document) for name in target}
     acting = path_curves.components_above(path_curves.FAINT, strain)
+    driven = [k for k in acting if strains[k] in prescribed and path_curves.legs(document) > 1]
+    varying = {strains[k]: strain[:, k] for k in (leading, *driven)}
+    varying |= {stresses[k]: stress[:, k] for k in sorted(visible)}
+    if any(point.get("temperature") for point in points):
+        varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
     varying |= {strains[k]: strain[:, k] for k in acting if stresses[k] in prescribed}
     first = dict(list(varying.items())[:5])
     rest = [name for name in varying if name not in first]
@@ -68,9 +70,10 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST:
-        at_end = peak["event"] == len(stresses) - 1
-        place = "there" if at_end else f"near its peak, {landmarks.fall_of(document, peak):.1%} below it"
-        text += f"; the path ends {place}"
+        leg, fall = path_curves.legs_of(document), landmarks.fall_of(document, peak)
+        at_end = peak["event"] == np.flatnonzero(leg == leg[peak["event"]])[-1]
+        whole = "the path" if leg[-1] == 1 else f"leg {leg[peak['event']]:.0f}"
+        text += f"; {whole} ends {'there' if at_end else f'near its peak, {fall:.1%} below it'}"
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
@@ -78,8 +81,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stresses_of_path = voigt.voigt_names(len(document["path"][0]["stress"]))
     for leg, k, number in path_curves.largest_of_legs(document):
-        if strains[k] != peak["strain_name"]:
-            strain, stress = (without_noise(document["path"][number][name][k]) for name in ("strain", "stress"))
+        strain, stress = (without_noise(document["path"][number][name][k]) for name in ("strain", "stress"))
+        if strains[k] != peak["strain_name"] and stress:
             name = stresses_of_path[k] + stress_label(document)
             lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {strains[k]} = {strain:.6g} (point {number})")
     if path_curves.scales_with_toughness(document):

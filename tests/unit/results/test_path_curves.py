@@ -172,6 +172,11 @@ def test_the_strength_of_the_first_leg_is_the_peak_although_later_legs_strain_mo
     for entry in path["path"][:3]:
         entry["broke"] = 0
     assert leading_component(path) == 2 and peak_of(path)["stress"] == 2.0
+    # Bonds that soften on the first leg, and break on a later one, give the same peak.
+    path["path"][1]["softened"] = 1
+    peak = peak_of(path)
+    assert leading_component(path) == 0
+    assert (peak["stress_name"], peak["stress"], peak["event"], peak["first_softening_stress"]) == ("S11", 5.0, 1, 5.0)
 
 
 def test_the_strain_that_leads_is_among_those_that_are_named() -> None:

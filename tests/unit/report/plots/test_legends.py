@@ -208,6 +208,8 @@ def test_the_picture_of_a_path_names_the_bonds_of_its_landmarks() -> None:
     document["peak"] = {"first_break_fibre": 3, "first_break_angle": -45.0, "fibre": 2, "angle": 12.5}
     words = " ".join(entries(path_picture(document)))
     assert "first break 1.5 GPa\nfibre 3 at -45°" in words and "fibre 2 at 12.5°" in words
+    document = path_of([1.0, 0.5, 0.2])  # one mark where both are one point
+    assert "first break and largest so far 3 GPa" in entries(path_picture(document))
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "stress"])
