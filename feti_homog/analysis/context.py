@@ -186,7 +186,7 @@ class AnalysisContext:
 
         comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
         if self.directory is None:  # without recorded states and tips, a path never rereads an event
-            reads_again = self.states.is_recording or self.plane.law.has_toughness
+            reads_again = self.states.is_recording or self.cell.bond_law.has_toughness
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]

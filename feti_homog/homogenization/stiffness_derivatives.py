@@ -55,7 +55,8 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     for phase in integrals[0][0]:
         for change in material_derivatives.law_changes(case.materials[phase], case.analysis.plane):
             if is_heated or not change.name.startswith("expansion"):
-                pairs = zip(phase_laws.law_derivatives(case, phase, change), integrals, strict=True)
+                laws = phase_laws.law_derivatives(case, phase, change.stiffness, change.expansion)
+                pairs = zip(laws, integrals, strict=True)
                 energies = tuple(np.einsum("ab,aibj->ij", dA, grams[phase]) / area for dA, (grams, _) in pairs)
                 changes.append(Derivative(f"material.{phase}.{change.name}", change.value, energies))
     springs = list[Float]()

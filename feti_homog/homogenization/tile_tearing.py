@@ -15,7 +15,7 @@ from mpi4py import MPI
 from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import arc_selection, cell_remarks
+from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, periodic_topology, submeshes
@@ -79,8 +79,13 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
     else:
         listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)
-        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
-        cell = gmsh_mesher.begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+        section, marks = case.cell, dict[int, list[float]]()
+        if case.arcs:
+            from feti_homog.homogenization import arc_selection  # other cells have no tips
+
+            section = replace(section, tip_size=arc_selection.size(case, estimate))
+            marks = arc_selection.marks(case, estimate.fibres)
+        cell = gmsh_mesher.begin(section, listed, marks, policy)
     cases.check_phases(case, cell.phases)
     return cell
 
