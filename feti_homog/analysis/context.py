@@ -13,8 +13,8 @@ import numpy as np
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
 from feti_homog.case import Case
 from feti_homog.homogenization import averaging, cell_remarks, phase_laws, unit_cell
-from feti_homog.interface import Load
-from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces, load_scales
+from feti_homog.interface import ABSURD, Load
+from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import progress_bar
@@ -238,7 +238,7 @@ class AnalysisContext:
             where = points if self.case.section.is_followed else ""
             reason = "with a given stress nothing resists them, and the result has one value of many"
             lines.append(f"{label} {', '.join(names)}: undetermined{where}: {reason}")
-        if self.excess > load_scales.ABSURD:
+        if self.excess > ABSURD:
             reason = "hardly anything carries the stresses"
             lines.append(f"{label} strains {self.excess:.1e} times those of the bonded cell: {reason}")
         return lines

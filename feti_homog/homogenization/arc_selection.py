@@ -92,7 +92,7 @@ class EstimatedNodes:
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
         """Return the tips that the mesher moved to vertices, by interface; none in a user's mesh."""
         if case.cell.has_own_mesh:
-            return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
+            return ({},) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             candidate = self.is_vertex & (self.pair == pair)

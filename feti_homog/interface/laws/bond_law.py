@@ -25,6 +25,7 @@ MOST_STEPS = 60
 # Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
 # factor too, and the process zone keeps its length.
 POWERS = {"strength": 1, "toughness": 2}
+Sections = Sequence[interface_section.InterfaceSection]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +35,7 @@ class SectionValues:
     The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
     """
 
-    bonds: Sequence[interface_section.InterfaceSection]
+    bonds: Sections
     pair: Int
     factor: float | Float
 
@@ -218,9 +219,7 @@ def law_class(name: str) -> type[BondLaw]:
     return law
 
 
-def law_of_sections(
-    bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0
-) -> BondLaw:
+def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
     """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))
