@@ -72,7 +72,7 @@ class FetiSolver:
     ) -> None:
         """Factor the subdomains and the coarse problem.  Collective.
 
-        `applications`, the expected number of products with F, `recovers`, and exceptions are as in `solver_plan.build`.
+        `applications`, the expected number of products with F, `recovers` and exceptions are as in `solver_plan.build`.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
