@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fem import bubble
-from feti_homog.fem.shape_functions import gradients
+from feti_homog.fem.shape_functions import MixedElements, gradients
 from feti_homog.typing import Float
 
 
@@ -38,7 +37,7 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
         stress = strain @ L
         return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
-    elements = bubble.Elements.of(points, L)
+    elements = MixedElements.of(points, L)
     inner = elements.with_bubble(u[..., None])
     strain, stress, mean = (field(inner)[..., 0] for field in (elements.strain, elements.stress, elements.dilatation))
     off = strain[..., 0] + strain[..., 1] - mean
