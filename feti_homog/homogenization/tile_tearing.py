@@ -23,7 +23,7 @@ from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.outline import lines
 from feti_homog.mesh.sizes import element_estimate, graded_size
 from feti_homog.mesh.tiles import tile_filling, tiling
-from feti_homog.system.parallel import distributed_arrays, dividing, mpi_errors
+from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Int
 
 
@@ -110,7 +110,7 @@ def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[
     """Deal the tiles on rank 0; return the numbers and tiles of this rank.  Collective."""
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
-    for k, rank in enumerate(dividing.balanced(loads, comm.size).tolist()):
+    for k, rank in enumerate(distributed_arrays.balanced(loads, comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
     return distributed_arrays.scatter(comm, parts)
 

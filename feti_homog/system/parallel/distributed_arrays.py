@@ -1,8 +1,9 @@
-"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects of any size.
+"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects; division of loads.
 
 mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent in place.
 """
 
+import heapq
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -10,8 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from mpi4py.util import pkl5
 
-from feti_homog.system.parallel.dividing import even
-from feti_homog.typing import Array, Float, Int
+from feti_homog.typing import AnyInt, Array, Float, Int
 
 T = TypeVar("T")
 
@@ -120,3 +120,26 @@ def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
 def scale_rows(weights: Float, x: Float) -> Float:
     """Compute diag(weights) x for weights (m,) and x (m,) or (m, k)."""
     return np.asarray((weights if x.ndim == 1 else weights[:, None]) * x)
+
+
+def balanced(load: AnyInt, n_ranks: int) -> Int:
+    """Assign loads (n,) to ranks (n,): in descending order, to the rank with the least load."""
+    ranks = np.zeros(len(load), np.int64)
+    heap = [(0, rank) for rank in range(n_ranks)]
+    for k in np.argsort(-load, kind="stable"):
+        total, rank = heap[0]
+        ranks[k] = rank
+        heapq.heapreplace(heap, (total + int(load[k]), rank))
+    return ranks
+
+
+def even(count: int, parts: int) -> Int:
+    """Return the bounds (parts + 1,) of ranges that divide 0 .. count - 1; lengths differ by at most 1."""
+    return np.arange(parts + 1) * count // parts
+
+
+def ranges(start: Int, count: Int) -> Int:
+    """Concatenate the ranges start[i] .. start[i] + count[i] - 1 for start, count (n,)."""
+    ends = np.cumsum(count)
+    shift: Int = np.repeat(start - ends + count, count)
+    return shift + np.arange(count.sum(), dtype=np.int64)
