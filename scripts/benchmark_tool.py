@@ -30,7 +30,7 @@ from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
 from feti_homog.homogenization.partition_policy import BY_COST  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime import process_memory  # noqa: E402
+from feti_homog.system.runtime import process  # noqa: E402
 from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
@@ -195,7 +195,7 @@ def _report(
 
 def peak() -> float:
     """Return the largest resident memory of this rank so far, in megabytes."""
-    return process_memory.peak() / MEGABYTE
+    return process.peak_memory() / MEGABYTE
 
 
 if __name__ == "__main__":

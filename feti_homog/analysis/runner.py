@@ -22,7 +22,7 @@ from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import process_memory, progress_bar, records, standard_streams
+from feti_homog.system.runtime import process, progress_bar, records, standard_streams
 from feti_homog.version import __version__
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
@@ -80,7 +80,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
     """Tear the cell while the PETSc options of the case are set.  Collective."""
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
-    process_memory.forget_peak(kept=SPARE_BYTES)
+    process.forget_peak(kept=SPARE_BYTES)
     for warning in case.warnings():  # all warnings while there is time to stop the run; remarks in the summary
         progress.say(f"warning: {warning}")
     with options_database.case_options(case.petsc):

@@ -32,7 +32,7 @@ from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MOST_DOFS_UNTRIMMED, Thresholds
 from feti_homog.mesh import ReferenceLattice
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 from feti_homog.typing import Float
 
 
@@ -84,7 +84,7 @@ class FetiSolver:
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.interface_operators, compliance)
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
-            process_memory.trim()
+            process.trim_memory()
         self.active = ActiveRows(self.rows)
         self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None

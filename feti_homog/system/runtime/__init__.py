@@ -6,6 +6,5 @@ Imports nothing.  Main entries: `progress_bar.Progress`, `file_locks`, `standard
 from feti_homog.system.runtime.records import described
 
 __all__ = [
-    "described", "environment", "file_locks", "input_files", "process_memory", "progress_bar",
-    "records", "standard_streams",
+    "described", "file_locks", "input_files", "process", "progress_bar", "records", "standard_streams",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 from feti_homog.system.runtime.standard_streams import say
 
 
@@ -62,4 +62,4 @@ class Progress:
 
     def memory(self) -> int:
         """Return the peak of resident memory in bytes, the maximum over ranks.  Collective."""
-        return int(self.comm.allreduce(process_memory.peak(), MPI.MAX))
+        return int(self.comm.allreduce(process.peak_memory(), MPI.MAX))
