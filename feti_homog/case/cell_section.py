@@ -14,6 +14,7 @@ from feti_homog.microstructure import phase_names
 from feti_homog.schema import key, keys, limits, types
 
 MOST_FIBRES = limits.FIBRES
+FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_pattern, fibre_table

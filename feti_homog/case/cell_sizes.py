@@ -11,7 +11,7 @@ from math import ceil, fsum, inf, log, pi, sqrt
 
 import numpy as np
 
-from feti_homog.case.cell_section import LATTICES, Cell
+from feti_homog.case.cell_section import LATTICES, TOUCHING, Cell
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import limits, wording
@@ -197,6 +197,28 @@ def mixed_width(cell: Cell) -> float | None:
         return cell.width
     filled = fsum(count * pi * cell.radii[phase] ** 2 for phase, count in fibre_counts(cell).items())
     return sqrt(filled / fsum(cell.fractions.values()))
+
+
+def size_faults(cell: Cell) -> list[str]:
+    """List the faults in fractions, radii, numbers of fibres and element sizes of a cell."""
+    faults, largest = list[str](), ("mesh_size", cell.mesh_size)
+    if cell.fibre_fraction is not None:
+        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
+        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
+        if cell.fibre_fraction >= limit:
+            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
+            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
+            faults.append(
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
+                f"{wording.limit_in_words(limit, cell.fibre_fraction, 4)} for "
+                f"geometry = {wording.toml_value(cell.geometry)}: {reason}"
+            )
+    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
+        if size is not None and size > largest[1]:
+            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        elif size is not None:
+            largest = name, size
+    return faults + mix_faults(cell)
 
 
 def mix_faults(cell: Cell) -> list[str]:

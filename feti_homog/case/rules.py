@@ -9,8 +9,7 @@ from typing import Any
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
-from feti_homog.case.cell_files import FEWEST_MATCHED
-from feti_homog.case.cell_section import MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
+from feti_homog.case.cell_section import FEWEST_MATCHED, MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
