@@ -17,8 +17,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators.choice import KINDS
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.operators.interface_operators import KINDS, InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner, SpringUpdated
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import mpi_errors
