@@ -57,11 +57,10 @@ def run(
         raise TypeError(f"run takes a Case, not {type(case).__name__}: Case.load reads a file, Case.parse a document")
     with _started(comm) as comm:
         from feti_homog.analysis import runner
-        from feti_homog.system.runtime import progress_bar
 
         if out is None:
             return runner.compute(case, comm, fields, quiet)
-        return runner.run(case, folder(out), progress_bar.Progress(comm, quiet), resume, fields)
+        return runner.run(case, folder(out), standard_streams.Progress(comm, quiet), resume, fields)
 
 
 def run_sweep(

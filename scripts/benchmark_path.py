@@ -32,7 +32,7 @@ from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0

@@ -31,7 +31,7 @@ from feti_homog.homogenization.partition_policy import BY_COST  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
 PREFIX = "peer_"

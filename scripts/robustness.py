@@ -27,7 +27,7 @@ from feti_homog.case.cases import Case  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 
 # Columns that are no whole numbers.
 REAL = (

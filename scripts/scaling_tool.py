@@ -38,7 +38,7 @@ from feti_homog.mesh.tiles.tiling import TilePolicy  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
 from feti_homog.system.runtime import process  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3

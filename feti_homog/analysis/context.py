@@ -17,7 +17,7 @@ from feti_homog.interface import ABSURD, Load
 from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import mpi_errors
-from feti_homog.system.runtime import progress_bar
+from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class AnalysisContext:
     loads: CellLoads
     checks: CheckRecorder
     states: StateRecorder
-    progress: progress_bar.Progress
+    progress: standard_streams.Progress
     directory: Path | None = None
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
@@ -126,7 +126,7 @@ class AnalysisContext:
 
     @classmethod
     def of(
-        cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
+        cls, cell: unit_cell.TornCell, progress: standard_streams.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
         """Return a context without a folder; `states` = None records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact

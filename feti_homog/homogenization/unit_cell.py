@@ -22,7 +22,7 @@ from feti_homog.homogenization.uniform_parts import UniformPart, locks
 from feti_homog.mesh import ReferenceLattice, Submesh, submeshes
 from feti_homog.microstructure import phase_names
 from feti_homog.system.parallel import mpi_errors
-from feti_homog.system.runtime import progress_bar
+from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ class TornCell:
 def tear(
     case: Case,
     comm: MPI.Intracomm,
-    progress: progress_bar.Progress,
+    progress: standard_streams.Progress,
     limits: thresholds.Thresholds = thresholds.DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
@@ -242,7 +242,7 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 
 
 def assemble_subdomains(
-    case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress, policy: PartitionPolicy = DEFAULT_POLICY
+    case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
 

@@ -17,7 +17,7 @@ from feti_homog.feti.thresholds import Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.parallel
 

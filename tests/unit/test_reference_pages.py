@@ -20,7 +20,7 @@ from feti_homog.materials.material_forms import CRITERIA
 from feti_homog.results.result_json import columns
 from feti_homog.studies import case_runs, collect, sweep_cases
 from feti_homog.studies.outputs import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS, outputs
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.slow
 
