@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feti_homog.case import section_values as kinds
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import key, keys, limits, types
+from feti_homog.schema import key, keys, types
 
-MOST_FIBRES = limits.FIBRES
+MOST_FIBRES = types.MOST_FIBRES
 FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 if TYPE_CHECKING:

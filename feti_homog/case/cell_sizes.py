@@ -14,7 +14,7 @@ import numpy as np
 from feti_homog.case.cell_section import LATTICES, TOUCHING, Cell
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import limits, wording
+from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
 """Largest Poisson's ratio of linear triangles; above it they lock."""
@@ -236,8 +236,8 @@ def mix_faults(cell: Cell) -> list[str]:
     if faults:
         return faults
     expected_counts = _expected_counts(cell)
-    if (count := fsum(expected_counts.values())) > limits.FIBRES:
-        words = f"expected at most {limits.FIBRES}, of larger radii or a smaller cell"
+    if (count := fsum(expected_counts.values())) > types.MOST_FIBRES:
+        words = f"expected at most {types.MOST_FIBRES}, of larger radii or a smaller cell"
         return [f"{given}: makes {count:.2g} fibres; {words}"]
     return [
         f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5, of more fibres or a wider cell"

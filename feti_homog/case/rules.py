@@ -16,7 +16,7 @@ from feti_homog.case.load_sections import MixedLoad
 from feti_homog.case.sections import DIFFERENTIABLE, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.errors import MOST_FAULTS
 from feti_homog.materials import voigt
-from feti_homog.schema import keys, limits, types, wording
+from feti_homog.schema import keys, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
@@ -56,14 +56,14 @@ class Rule:
         if not all(condition.holds(selected) for condition in self.when):
             return
         content = document.get(self.path[0]) if self.path else document
-        sections = content[: limits.SECTIONS] if isinstance(content, list) else [content]
+        sections = content[: types.MOST_SECTIONS] if isinstance(content, list) else [content]
         label = " ".join(self.path[:1])
         matches = [(f"{label} {k}" if len(sections) > 1 else label, "", each) for k, each in enumerate(sections, 1)]
         for step in self.path[1:]:
             parents, matches = matches, []
             for name, place, parent in parents:
                 if step == ITEMS and isinstance(parent, list):
-                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: limits.ROWS])]
+                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: types.MOST_ROWS])]
                 elif isinstance(parent, dict) and step in parent:
                     matches.append((name, f"{place}.{step}" if place else step, parent[step]))
         faulty = (match for match in matches if not (match[2] is None or (self.holds and self.holds(match[2]))))

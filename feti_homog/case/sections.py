@@ -14,7 +14,7 @@ from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_sections import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
 from feti_homog.case.section_values import ANALYSIS_TYPE, MECHANICAL, PATH_ANALYSIS, SEED, STATES
 from feti_homog.materials import material_forms
-from feti_homog.schema import key, keys, limits, types, wording
+from feti_homog.schema import key, keys, types, wording
 
 Scalar = str | int | float | bool
 
@@ -40,7 +40,7 @@ RANGE_KEYS = {
     "to": keys.Key(types.real(), "Last value.", required=True),
     "step": keys.Key(types.real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
     "count": keys.Key(
-        types.integer(least=2, most=limits.ROWS),
+        types.integer(least=2, most=types.MOST_ROWS),
         "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
     "scale": keys.Key(
@@ -61,7 +61,7 @@ class SweepSection:
         default="grid",
     )
     samples: int | None = key(
-        types.integer(least=1, most=limits.ROWS),
+        types.integer(least=1, most=types.MOST_ROWS),
         "Number of points in the box of the ranges that have neither step nor count.",
         default=None,
     )
@@ -70,7 +70,7 @@ class SweepSection:
     )
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
-        types.integer(least=1, most=limits.ROWS),
+        types.integer(least=1, most=types.MOST_ROWS),
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )
