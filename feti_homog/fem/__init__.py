@@ -7,5 +7,5 @@ from feti_homog.fem.problem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Proble
 
 __all__ = [
     "AXIAL", "CONDUCTION", "GENERALIZED", "PLANE", "Problem", "arc_error", "assembly", "local_fits",
-    "point_fields", "shape_functions", "stress_recovery",
+    "shape_functions", "stress_recovery",
 ]  # fmt: skip
