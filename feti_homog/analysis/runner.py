@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog import __version__
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
@@ -23,7 +24,6 @@ from feti_homog.results import field_file, field_parts, output_folder, result_js
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
 from feti_homog.system.runtime import process, records, standard_streams
-from feti_homog.version import __version__
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
 SPARE_BYTES = 256 << 20
@@ -195,8 +195,8 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         fibre_fraction=meshed,
         fractions=fractions,
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
-        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-        nodes=cell.sum_over_ranks(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
+        elements=cell.comm.allreduce(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.comm.allreduce(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,

@@ -99,10 +99,7 @@ def _read_material(
     if material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
         if material.strength is not None and plane != voigt.CONDUCTION.name:
-            checks += [
-                lambda material: material_forms.criterion(material.strength),
-                partial(_known_stress, plane=plane),
-            ]
+            checks += [lambda m: material_forms.criterion(m.strength), partial(_known_stress, plane=plane)]
         for check in (*checks, laws.expansion):
             try:
                 check(material)

@@ -18,7 +18,6 @@ from feti_homog.schema import key, keys, types, wording
 
 Scalar = str | int | float | bool
 
-PREFIXED = r"feti_\w+"  # options of [petsc]
 OPTION_EXPECTED = "a string, a number, true or false"
 SWEEP = "sweep"
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
@@ -74,9 +73,6 @@ class SweepSection:
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )
-
-
-OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +149,7 @@ class Output:
     pictures: bool = key(types.boolean, "Draw PNG files, without fields curves alone.", default=True, presentation=True)
     report: bool = key(types.boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
-        types.choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
+        types.choice("auto", "S11", "S22", "S12", "S33", "S23", "S13"),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
         "plane strain.",
         default="auto",
@@ -293,7 +289,7 @@ def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
         start = f"[petsc] {wording.toml_key(name)} = {wording.toml_value(value)}: expected"
         if name.startswith("-"):
             faults.append(f"{start} the option's name without its dash")
-        elif not re.fullmatch(PREFIXED, name):
+        elif not re.fullmatch(r"feti_\w+", name):
             faults.append(f"{start} the prefix feti_; PETSc's own options are for the command line")
         elif not (isinstance(value, bool) or types.is_number(value) or types.text.accepts(value)):
             faults.append(f"{start} {OPTION_EXPECTED}")

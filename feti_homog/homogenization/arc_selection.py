@@ -11,8 +11,8 @@ from feti_homog.case import Case, interface_section
 from feti_homog.homogenization.cell_remarks import LEAST_SIZE
 from feti_homog.interface import debonded_arcs
 from feti_homog.mesh import ReferenceLattice, Torus
+from feti_homog.mesh.fill import element_estimate
 from feti_homog.mesh.outline import outline
-from feti_homog.mesh.sizes import element_estimate
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 

@@ -19,9 +19,8 @@ from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, periodic_topology, submeshes
-from feti_homog.mesh.fill import gmsh_mesher
-from feti_homog.mesh.outline import lines
-from feti_homog.mesh.sizes import element_estimate, graded_size
+from feti_homog.mesh.fill import element_estimate, gmsh_mesher
+from feti_homog.mesh.outline import graded_size, lines
 from feti_homog.mesh.tiles import tile_filling, tiling
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Int

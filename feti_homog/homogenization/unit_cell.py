@@ -188,10 +188,6 @@ class TornCell:
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
 
-    def sum_over_ranks(self, number: int) -> int:
-        """Sum a number over all ranks.  Collective."""
-        return int(self.comm.allreduce(number))
-
     def destroy(self) -> None:
         """Free the solvers.  Collective."""
         for cell in self.problems:

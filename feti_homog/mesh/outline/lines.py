@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.mesh.outline.graded_size import SizeField
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
