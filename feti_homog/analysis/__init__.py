@@ -5,4 +5,4 @@ Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `mesh`, `mic
 Main entries: `runner.run` (with files) and `runner.compute` (without).
 """
 
-__all__ = ["description", "result", "runner", "stored_result"]
+__all__ = ["description", "result", "runner", "stepped_progress", "stored_result"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis import path_events
+from feti_homog.analysis import path_events, stepped_progress
 from feti_homog.analysis.constants import check_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import PathPoint, Peak
@@ -43,7 +43,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
     count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds = list[tuple[float, float]]()
-    with standard_streams.shown_steps(context.progress, "load") as advance:
+    with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             if before is not None:

@@ -9,7 +9,7 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import Any
 
-from feti_homog.analysis import description, runner
+from feti_homog.analysis import description, runner, stepped_progress
 from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.studies import case_folders
@@ -159,7 +159,7 @@ class CaseRunner:
         timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
         try:
-            with standard_streams.shown_steps(progress, label) as advance:
+            with stepped_progress.shown(progress, label) as advance:
                 while timeouts:
                     outcomes = list[Outcome]()
                     for number, entry in enumerate(self.sweep.entries, 1):

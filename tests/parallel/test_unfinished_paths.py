@@ -12,6 +12,7 @@ import pytest
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run, run_sweep
+from feti_homog.analysis import stepped_progress
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.report import page
 from feti_homog.report.cards import export
@@ -19,7 +20,7 @@ from feti_homog.report.plots import figures, path_picture
 from feti_homog.results import checkpoints, field_file, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
 from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.system.runtime import file_locks, standard_streams
+from feti_homog.system.runtime import file_locks
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -184,14 +185,14 @@ def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
 
 @pytest.mark.one_rank
 def test_a_sweep_shows_the_load_of_the_path_that_it_computes(comm, shared_path, monkeypatch):
-    calls, shown = list[tuple[Any, ...]](), standard_streams.shown_steps
+    calls, shown = list[tuple[Any, ...]](), stepped_progress.shown
 
     @contextmanager
     def seen(progress: Any, label: str) -> Iterator[Any]:
         with shown(progress, label) as advance:
             yield lambda *words: (calls.append((label, *words)), advance(*words))
 
-    monkeypatch.setattr(standard_streams, "shown_steps", seen)
+    monkeypatch.setattr(stepped_progress, "shown", seen)
     document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
     run_sweep(document, shared_path, comm)
     loads = on_root(comm, lambda: [[p["load_factor"] for p in result_json.read(shared_path / f"case-000{k}")["path"]]

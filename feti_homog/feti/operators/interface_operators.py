@@ -152,8 +152,7 @@ class InterfaceOperators:
         nodes = (s.problem.nodes(np.flatnonzero(mask)) for s, mask in zip(subdomains, constrained, strict=True))
         self.dofs = [s.problem.dofs(np.unique(nodes_s)) for s, nodes_s in zip(subdomains, nodes, strict=True)]
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
-        numbers = (offset + dofs for offset, dofs in zip(first[:-1], self.dofs, strict=True))
-        self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
+        self.local_dofs = np.concatenate([np.zeros(0, np.int64), *map(np.add, first, self.dofs)])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
         first_row, last_row = jump_operator.owned
@@ -172,8 +171,8 @@ class InterfaceOperators:
             SubdomainSize(s.n_dofs, len(dofs), s.submesh.index not in pieces, not s.is_outer and root is not None)
             for s, dofs, root in zip(subdomains, self.dofs, roots, strict=True)
         ]
-        has_mumps = PETSc.Sys.hasExternalPackage("mumps")
-        explicit, self.facewise = choose(sizes, kind, applications, soft_modes, has_mumps, thresholds)
+        how = kind, applications, soft_modes, PETSc.Sys.hasExternalPackage("mumps"), thresholds
+        explicit, self.facewise = choose(sizes, *how)
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
         self.interiors: dict[int, one_subdomain.Interior] = {}

@@ -11,15 +11,13 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import shutil
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from datetime import timedelta
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from feti_homog.errors import FetiHomogError, escaped
 from feti_homog.system.runtime import file_locks, process
@@ -32,7 +30,6 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit o
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # Seconds that other ranks wait for the message of rank 0: Open MPI drops it after the end of another rank.
 SILENT_SECONDS = 5.0
-SECONDS_A_LINE = 60.0  # of the progress of a long computation in a file
 remarks = list[str]()  # that rank 0 prints where a signal ends the process
 KEPT = "\n\t"  # characters that are printed although they are not printable; others, from files, are escaped
 
@@ -161,48 +158,3 @@ class Progress:
     def memory(self) -> int:
         """Return the peak of resident memory in bytes, the maximum over ranks.  Collective."""
         return int(max(self.comm.allgather(process.peak_memory())))
-
-
-@contextlib.contextmanager
-def shown_steps(
-    progress: Progress, label: str, clock: Callable[[], float] = time.monotonic
-) -> Iterator[Callable[[float, int, str, bool], object]]:
-    """Show the finished share of a computation, the rate of steps, and the time used and left.
-
-    The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
-    time left assumes that the rest of the share takes as long as the share since the last known step.
-    """
-    if (within := progress.within) is not None:
-        yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")
-        return
-    begin = clock()
-    reached, next_line, since = 0.0, begin + SECONDS_A_LINE, (begin, 0.0, 0)
-    bar: Any = None
-    if progress.on_terminal:
-        from tqdm import tqdm  # unused in most runs, and slow to import
-
-        columns, rows = shutil.get_terminal_size()  # 80 x 24 of a terminal that says 0 x 0
-        look = "{l_bar}{bar}| {elapsed} used{postfix}"
-        bar = tqdm(total=1.0, desc=label, bar_format=look, leave=False, ncols=columns, nrows=rows)
-
-    def advance(share: float, count: int, text: str, known: bool) -> None:
-        nonlocal reached, next_line, since
-        now, reached = clock(), max(share, reached)  # the load falls in a snap-back
-        since = (now, reached, count) if known else since
-        seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
-        text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
-        if gain:  # first, since a narrow terminal shows the begin
-            text = f"{timedelta(seconds=round(seconds * (1.0 - reached) / gain))} left, {text}"
-        if bar is not None:
-            bar.set_postfix_str(text, refresh=False)
-            bar.update(reached - bar.n)
-        elif now >= next_line:
-            used = timedelta(seconds=round(now - begin))
-            progress.say(f"  {label} {reached:.0%}, {used} used, {text}")
-            next_line = now + SECONDS_A_LINE
-
-    try:
-        yield advance
-    finally:
-        if bar is not None:
-            bar.close()

@@ -7,7 +7,7 @@ import pytest
 import tqdm
 from mpi4py import MPI
 
-from feti_homog.system.runtime import standard_streams
+from feti_homog.analysis import stepped_progress
 from feti_homog.system.runtime.standard_streams import Progress
 
 
@@ -32,7 +32,7 @@ class Clock:
 def shown_lines(shares, seconds, known=0):
     """Return the lines about steps that take `seconds` each; the first `known` steps take no time."""
     progress, clock = Words(), Clock()
-    with standard_streams.shown_steps(progress, "load", clock) as advance:
+    with stepped_progress.shown(progress, "load", clock) as advance:
         for count, share in enumerate(shares, 1):
             clock.now += 0.0 if count <= known else seconds
             advance(share, count, f"{count} events", count <= known)
@@ -71,7 +71,7 @@ def test_a_snap_back_leaves_the_share():
 def test_a_computation_within_another_shows_its_share_there():
     shown = []
     progress = Progress(MPI.COMM_SELF, quiet=True, within=lambda *words: shown.append(words))
-    with standard_streams.shown_steps(progress, "load") as advance:
+    with stepped_progress.shown(progress, "load") as advance:
         advance(0.25, 3, "3 events", False)
     assert shown == [(0.25, "load 25%, 3 events")]
 
@@ -80,7 +80,7 @@ def test_a_terminal_has_a_bar_with_the_same_numbers(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr("tqdm.tqdm", partial(tqdm.tqdm, mininterval=0))  # drawn after each step
     progress, clock = Words(on_terminal=True), Clock()
-    with pytest.raises(ValueError), standard_streams.shown_steps(progress, "load", clock) as advance:
+    with pytest.raises(ValueError), stepped_progress.shown(progress, "load", clock) as advance:
         for count, share in enumerate((0.25, 0.125, 0.75), 1):
             clock.now += 60.0
             advance(share, count, f"{count} events", False)
@@ -97,7 +97,7 @@ def test_a_terminal_of_unknown_size_has_a_bar(monkeypatch):
     monkeypatch.setattr("tqdm.tqdm", lambda **look: sizes.append((look["ncols"], look["nrows"])) or bar())
     for name in ("COLUMNS", "LINES"):
         monkeypatch.delenv(name, raising=False)
-    with standard_streams.shown_steps(Words(on_terminal=True), "load", Clock()):
+    with stepped_progress.shown(Words(on_terminal=True), "load", Clock()):
         pass
     assert sizes == [(80, 24)]
 

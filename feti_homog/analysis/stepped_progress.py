@@ -1,0 +1,57 @@
+"""The progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from typing import Any
+
+from feti_homog.system.runtime import standard_streams
+
+SECONDS_A_LINE = 60.0
+
+
+@contextmanager
+def shown(
+    progress: standard_streams.Progress, label: str, clock: Callable[[], float] = time.monotonic
+) -> Iterator[Callable[[float, int, str, bool], object]]:
+    """Show the finished share of a computation, the rate of steps, and the time used and left.
+
+    The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
+    time left assumes that the rest of the share takes as long as the share since the last known step.
+    """
+    if (within := progress.within) is not None:
+        yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")
+        return
+    begin = clock()
+    reached, next_line, since = 0.0, begin + SECONDS_A_LINE, (begin, 0.0, 0)
+    bar: Any = None
+    if progress.on_terminal:
+        from tqdm import tqdm  # unused in most runs, and slow to import
+
+        columns, rows = shutil.get_terminal_size()  # 80 x 24 of a terminal that says 0 x 0
+        look = "{l_bar}{bar}| {elapsed} used{postfix}"
+        bar = tqdm(total=1.0, desc=label, bar_format=look, leave=False, ncols=columns, nrows=rows)
+
+    def advance(share: float, count: int, text: str, known: bool) -> None:
+        nonlocal reached, next_line, since
+        now, reached = clock(), max(share, reached)  # the load falls in a snap-back
+        since = (now, reached, count) if known else since
+        seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
+        text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
+        if gain:  # first, since a narrow terminal shows the begin
+            text = f"{timedelta(seconds=round(seconds * (1.0 - reached) / gain))} left, {text}"
+        if bar is not None:
+            bar.set_postfix_str(text, refresh=False)
+            bar.update(reached - bar.n)
+        elif now >= next_line:
+            used = timedelta(seconds=round(now - begin))
+            progress.say(f"  {label} {reached:.0%}, {used} used, {text}")
+            next_line = now + SECONDS_A_LINE
+
+    try:
+        yield advance
+    finally:
+        if bar is not None:
+            bar.close()
