@@ -167,7 +167,7 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     others |= {"feti.coarse.adaptive", "feti.exact.exact_inverse", "feti.operators.with_springs"}
     assert "analysis.stiffness" in loaded and not {"matplotlib"} & {*run.stdout.split()}
     assert not {name for name in loaded if any(name == other or name.startswith(f"{other}.") for other in others)}
-    assert len(loaded) <= 130
+    assert len(loaded) < 130  # with the package itself
 
 
 def test_only_a_rank_that_prints_or_draws_loads_what_is_for_readers():
