@@ -10,7 +10,7 @@ README = HERE / "README.md"
 
 setup(
     name="feti_homog",
-    version=re.search(r'__version__ = "(.+)"', (HERE / "feti_homog/version.py").read_text())[1],
+    version=re.search(r'__version__ = "(.+)"', (HERE / "feti_homog/__init__.py").read_text())[1],
     description="Parallel FETI homogenization of fibre composites with bonded and debonded constituents",
     long_description=README.read_text(encoding="utf-8") if README.exists() else "",
     long_description_content_type="text/markdown",

@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING, Any
 os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
-from feti_homog.version import __version__
+
+__version__ = "1.0.0"
 
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result

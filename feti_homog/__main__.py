@@ -5,16 +5,16 @@ import signal
 import sys
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.system.runtime import environment, process_memory, standard_streams
+from feti_homog.system.runtime import process, standard_streams
 
 
 def main() -> int:
     """Run the command line in a prepared environment; returns the exit code."""
-    environment.prepare(os.environ)
+    process.prepare_environment(os.environ)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
     try:
-        process_memory.require_limits()
+        process.require_limits()
     except FetiHomogError as error:
         rank = standard_streams.launched_rank()  # others may have other limits
         standard_streams.complain(*(f"error: {f'rank {rank}: ' if rank else ''}{fault}" for fault in error.faults))

@@ -16,7 +16,7 @@ from feti_homog.case import Case
 from feti_homog.errors import CaseError, ExitCode, FetiHomogError, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
-from feti_homog.system.runtime import environment, standard_streams
+from feti_homog.system.runtime import process, standard_streams
 from feti_homog.typing import Intracomm
 
 if TYPE_CHECKING:
@@ -57,11 +57,10 @@ def run(
         raise TypeError(f"run takes a Case, not {type(case).__name__}: Case.load reads a file, Case.parse a document")
     with _started(comm) as comm:
         from feti_homog.analysis import runner
-        from feti_homog.system.runtime import progress_bar
 
         if out is None:
             return runner.compute(case, comm, fields, quiet)
-        return runner.run(case, folder(out), progress_bar.Progress(comm, quiet), resume, fields)
+        return runner.run(case, folder(out), standard_streams.Progress(comm, quiet), resume, fields)
 
 
 def run_sweep(
@@ -158,8 +157,8 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
     standard_streams.end_on_signals()
-    environment.prefer_own_toolkits()
-    environment.ignore_settings_of_the_folder()
+    process.prefer_own_toolkits()
+    process.ignore_settings_of_the_folder()
     try:
         libraries.require()
     except LibraryError as error:
@@ -217,7 +216,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
     """Start PETSc unless it runs, and yield the communicator, by default of all ranks, to one thread at a time."""
     standard_streams.prepare()
-    environment.prefer_own_toolkits()
+    process.prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
 

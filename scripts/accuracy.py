@@ -31,7 +31,7 @@ from feti_homog.case import cases  # noqa: E402
 from feti_homog.feti.linalg.sparse_direct import DirectSolver  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 
 # C11, C12, C33 in plane strain at a fibre fraction of 0.4: Fourier solutions whose truncations agree to 2e-9.
 REFERENCE = {"square": (151.155859, 55.537426, 45.078553), "hexagonal": (149.690255, 56.975975, 46.357140)}

@@ -31,8 +31,8 @@ from feti_homog.interface.loads import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime import process  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0
@@ -143,7 +143,7 @@ def measure(arguments: argparse.Namespace) -> Measured:
         setup = clock() - start
         count = None if arguments.to_the_end else arguments.events
         seconds, iterations, solves = run_events(homogenization, count, clock)
-    memory = process_memory.peak()
+    memory = process.peak_memory()
     K, Q = glued(cell)
     factor, solve = np.median([factor_and_solve(K, Q[:, :1], clock) for _ in range(PEER_RUNS)], axis=0)
     peer = float(factor), float(solve)

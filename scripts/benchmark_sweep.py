@@ -71,7 +71,7 @@ def loop(path: Path) -> None:
     from mpi4py import MPI
 
     from feti_homog.studies import sweep_cases
-    from feti_homog.system.runtime.progress_bar import Progress
+    from feti_homog.system.runtime.standard_streams import Progress
 
     for case in sweep_cases.expand(tomllib.loads(path.read_text()), path.parent).cases:
         peer(PEERS[PEER], case, Progress(MPI.COMM_WORLD, quiet=True), None, RTOL)

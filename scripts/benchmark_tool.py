@@ -30,8 +30,8 @@ from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
 from feti_homog.homogenization.partition_policy import BY_COST  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime import process  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
 PREFIX = "peer_"
@@ -81,7 +81,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
                 columns.append(np.stack([response.stress for response in responses], axis=1))
                 for response in responses:
                     context.checks.record("", response)
-    dofs = cell.sum_over_ranks(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
+    dofs = cell.comm.allreduce(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
     cell.destroy()
     return _report(dofs, cell.summary.subdomains, columns, context.checks.iterations, context.checks.reasons)
 
@@ -195,7 +195,7 @@ def _report(
 
 def peak() -> float:
     """Return the largest resident memory of this rank so far, in megabytes."""
-    return process_memory.peak() / MEGABYTE
+    return process.peak_memory() / MEGABYTE
 
 
 if __name__ == "__main__":

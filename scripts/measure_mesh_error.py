@@ -34,7 +34,7 @@ from feti_homog.homogenization.mesh_estimate import energy_errors, factors, is_n
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.uniform_parts import locks
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 from feti_homog.typing import Float
 
 SIZES = {1: (0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05)}

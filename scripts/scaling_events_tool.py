@@ -27,7 +27,7 @@ from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 
 
 def main() -> int:

@@ -37,8 +37,8 @@ from feti_homog.mesh.tiles.tile_filling import fill  # noqa: E402
 from feti_homog.mesh.tiles.tiling import TilePolicy  # noqa: E402
 from feti_homog.system.parallel.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.system.petsc.options_database import case_options  # noqa: E402
-from feti_homog.system.runtime import process_memory  # noqa: E402
-from feti_homog.system.runtime.progress_bar import Progress  # noqa: E402
+from feti_homog.system.runtime import process  # noqa: E402
+from feti_homog.system.runtime.standard_streams import Progress  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3
@@ -94,7 +94,7 @@ class StagePeaks(Progress):
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
         """Time a stage, as `Progress.stage`."""
-        process_memory.forget_peak()
+        process.forget_peak()
         with super().stage(name) as words:
             yield words
         self.peaks[name] = peak()
@@ -229,7 +229,7 @@ def _coarse(
     natural_solve = fastest(lambda: natural.solver.solve(natural.solver.solve(motions)))
     inner = coarse.solver.iterations
     part = coarse.part()
-    process_memory.forget_peak()
+    process.forget_peak()
     before = peak()
     comm.Barrier()
     factor, natural_factor = seconds_of(lambda: coarse.factor(part)), seconds_of(natural.factor)

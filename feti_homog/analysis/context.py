@@ -13,11 +13,11 @@ import numpy as np
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
 from feti_homog.case import Case
 from feti_homog.homogenization import averaging, cell_remarks, phase_laws, unit_cell
-from feti_homog.interface import Load
-from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces, load_scales
+from feti_homog.interface import ABSURD, Load
+from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces
 from feti_homog.materials import voigt
 from feti_homog.system.parallel import mpi_errors
-from feti_homog.system.runtime import progress_bar
+from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class AnalysisContext:
     loads: CellLoads
     checks: CheckRecorder
     states: StateRecorder
-    progress: progress_bar.Progress
+    progress: standard_streams.Progress
     directory: Path | None = None
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
@@ -126,7 +126,7 @@ class AnalysisContext:
 
     @classmethod
     def of(
-        cls, cell: unit_cell.TornCell, progress: progress_bar.Progress, states: StateRecorder | None = None
+        cls, cell: unit_cell.TornCell, progress: standard_streams.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
         """Return a context without a folder; `states` = None records no states."""
         contact = cell.case.interface is not None and cell.case.interface.contact
@@ -186,7 +186,7 @@ class AnalysisContext:
 
         comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
         if self.directory is None:  # without recorded states and tips, a path never rereads an event
-            reads_again = self.states.is_recording or self.plane.law.has_toughness
+            reads_again = self.states.is_recording or self.cell.bond_law.has_toughness
             return checkpoints.EventsInMemory(comm, room if reads_again else 0)
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
@@ -238,7 +238,7 @@ class AnalysisContext:
             where = points if self.case.section.is_followed else ""
             reason = "with a given stress nothing resists them, and the result has one value of many"
             lines.append(f"{label} {', '.join(names)}: undetermined{where}: {reason}")
-        if self.excess > load_scales.ABSURD:
+        if self.excess > ABSURD:
             reason = "hardly anything carries the stresses"
             lines.append(f"{label} strains {self.excess:.1e} times those of the bonded cell: {reason}")
         return lines

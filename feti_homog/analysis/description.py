@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from feti_homog.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti import factory, solver_plan
+from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition import shared_entities
 from feti_homog.homogenization import cell_remarks, domain_partition, partition_policy, phase_laws, tile_tearing
 from feti_homog.mesh import ReferenceLattice
@@ -27,7 +27,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
         loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
         c = phase_laws.problems(case)[0].components
-        options, summary, multipliers = factory.database_options(), part.summary, c * constraints
+        options, summary, multipliers = solver_plan.database_options(), part.summary, c * constraints
 
         def described() -> str:
             cell, subdomains = case.cell, [count for count, _ in loads]

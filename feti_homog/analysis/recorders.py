@@ -10,7 +10,7 @@ from feti_homog.analysis.cell_records import PhaseStresses
 from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization import averaging, recovered_fields, unit_cell
-from feti_homog.materials import strength
+from feti_homog.materials import material_forms
 from feti_homog.results import field_file, field_layout, field_parts, result_json
 from feti_homog.system.parallel import mpi_errors
 
@@ -157,8 +157,8 @@ class StateRecorder:
                 modes, states = values.argmax(axis=1), np.arange(len(values))
                 columns |= {name: values[states, modes], f"{name}_at": places[states, modes] + origin}
         if limit is not None:
-            columns["criterion"] = strength.criterion(limit)
-            columns["mode"] = tuple(map(strength.MODES.__getitem__, modes)) if values.shape[1] > 1 else None
+            columns["criterion"] = material_forms.criterion(limit)
+            columns["mode"] = tuple(map(material_forms.MODES.__getitem__, modes)) if values.shape[1] > 1 else None
         return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:

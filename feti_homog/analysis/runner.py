@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog import __version__
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
@@ -22,8 +23,7 @@ from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import process_memory, progress_bar, records, standard_streams
-from feti_homog.version import __version__
+from feti_homog.system.runtime import process, records, standard_streams
 
 # Bytes that a process keeps between cases: their release would cost a small case 10 % of its time.
 SPARE_BYTES = 256 << 20
@@ -32,7 +32,7 @@ REMARKABLE_LOSS = 0.005  # fraction of the fibre area that straight edges cut of
 
 
 def run(
-    case: Case, directory: Path, progress: progress_bar.Progress, resume: bool = False, keep_fields: bool = False
+    case: Case, directory: Path, progress: standard_streams.Progress, resume: bool = False, keep_fields: bool = False
 ) -> Result:
     """Run a case, write its result to `directory`, and return the result.  Collective over `progress.comm`.
 
@@ -65,7 +65,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         CaseError, MeshError: the case cannot be run.
         ConvergenceError: a solve did not converge or a check failed.
     """
-    progress = progress_bar.Progress(comm, quiet)
+    progress = standard_streams.Progress(comm, quiet)
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
@@ -77,10 +77,10 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 
 @contextmanager
-def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> Iterator[unit_cell.TornCell]:
+def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) -> Iterator[unit_cell.TornCell]:
     """Tear the cell while the PETSc options of the case are set.  Collective."""
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
-    process_memory.forget_peak(kept=SPARE_BYTES)
+    process.forget_peak(kept=SPARE_BYTES)
     for warning in case.warnings():  # all warnings while there is time to stop the run; remarks in the summary
         progress.say(f"warning: {warning}")
     with options_database.case_options(case.petsc):
@@ -99,7 +99,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress) -> I
 
 
 def _run_and_write(
-    cell: unit_cell.TornCell, directory: Path, progress: progress_bar.Progress, resume: bool, keep_fields: bool
+    cell: unit_cell.TornCell, directory: Path, progress: standard_streams.Progress, resume: bool, keep_fields: bool
 ) -> Result:
     """Analyse a torn cell, write the files, and return the result.  Collective."""
     output, file = cell.case.output, None
@@ -195,8 +195,8 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         fibre_fraction=meshed,
         fractions=fractions,
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
-        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-        nodes=cell.sum_over_ranks(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
+        elements=cell.comm.allreduce(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.comm.allreduce(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
@@ -228,7 +228,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
     return Result(status=status, fields=fields, phase_stresses=context.states.phase_stresses(), **entries, **analysis)
 
 
-def _print_summary(result: Result, progress: progress_bar.Progress) -> None:
+def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
     """Print the summary on rank 0, without warnings, which are printed before, and faults, which the error says.
 
     Other ranks load no tables.  Collective.

@@ -7,14 +7,14 @@ from contextlib import contextmanager
 from datetime import timedelta
 from typing import Any
 
-from feti_homog.system.runtime import progress_bar
+from feti_homog.system.runtime import standard_streams
 
 SECONDS_A_LINE = 60.0
 
 
 @contextmanager
 def shown(
-    progress: progress_bar.Progress, label: str, clock: Callable[[], float] = time.monotonic
+    progress: standard_streams.Progress, label: str, clock: Callable[[], float] = time.monotonic
 ) -> Iterator[Callable[[float, int, str, bool], object]]:
     """Show the finished share of a computation, the rate of steps, and the time used and left.
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.case import bond_laws, cell_sizes, sections
-from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
@@ -250,8 +249,16 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     of_rules = [[*rule.faults(document, selected)] for rule in rules]
     foreign = {rule.path[0] for rule, lines in zip(rules, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
+    if "cell" in foreign or cell is None or not folder:
+        cell = None
+    elif cell.file is None and cell.fibre_list is None and cell.match is None:
+        faults += cell_sizes.size_faults(cell)
+    else:
+        from feti_homog.case import cell_files  # few cells have files
+
+        cell = cell_files.checked_cell(cell, folder, faults)
     contents = {
-        "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),
+        "cell": cell,
         "materials": read_materials(document, selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.case.cell_section import TOUCHING, Cell
-from feti_homog.case.cell_sizes import mix_faults
+from feti_homog.case.cell_section import FEWEST_MATCHED, Cell
+from feti_homog.case.cell_sizes import size_faults
 from feti_homog.case.section_values import IMAGE_SUFFIXES, MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import MOST_FAULTS, CaseError
 from feti_homog.schema import wording
@@ -23,30 +23,12 @@ SUFFIXES = {"mesh": MESH_SUFFIXES, "pixels": IMAGE_SUFFIXES, "table": TABLE_SUFF
 LIST = "fibre_list"
 # Distance from a cut window / radius, up to which a centre outside counts as on the border.
 LEFT_OUT = 0.01
-FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Read the files of a cell into its section, and append all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
-    if cell.fibre_fraction is not None:
-        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
-        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
-        if cell.fibre_fraction >= limit:
-            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
-            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
-            faults.append(
-                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
-                f"{wording.limit_in_words(limit, cell.fibre_fraction, 4)} for "
-                f"geometry = {wording.toml_value(cell.geometry)}: {reason}"
-            )
-    largest = ("mesh_size", cell.mesh_size)
-    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
-        if size is not None and size > largest[1]:
-            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
-        elif size is not None:
-            largest = name, size
-    faults += mix_faults(cell)
+    faults += size_faults(cell)
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feti_homog.case import section_values as kinds
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import key, keys, limits, types
+from feti_homog.schema import key, keys, types
 
-MOST_FIBRES = limits.FIBRES
+FEWEST_MATCHED = 10  # fibres: the distances between fewer fibres have no distribution
 
 if TYPE_CHECKING:
     from feti_homog.microstructure import fibre_pattern, fibre_table
@@ -40,7 +40,6 @@ ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"
 MESH, PIXELS, OWN_MESH = GEOMETRY.among("mesh"), GEOMETRY.among("pixels"), GEOMETRY.among("mesh", "pixels")
 MESHED, SIZED = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among(*CIRCULAR, "table", "pixels")
 FROM_A_FILE, REPAIRABLE = GEOMETRY.among("table", "mesh", "pixels"), GEOMETRY.among("table", "mesh")
-WINDOWED = GEOMETRY.among("table", "pixels")
 random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
 
 
@@ -137,7 +136,7 @@ class Cell:
         default="torus",
     )
     fibres: int | None = random_key(
-        types.integer(least=1, most=MOST_FIBRES),
+        types.integer(least=1, most=types.MOST_FIBRES),
         "Number of fibres.",
         unless=("match", "radii"),
         default_words="required, or given by match, or by width and radii",
@@ -263,7 +262,7 @@ class Cell:
         "whose fibres may overlap across the border: they are moved apart as little as can be. Those with centres "
         'outside are left out. "mirrored", of an image: beside and above it lie its mirror images, four in a cell.',
         default="periodic",
-        only=WINDOWED,
+        only=GEOMETRY.among("table", "pixels"),
     )
     table: fibre_table.FibreTable | None = field(default=None, compare=False)
     matched: fibre_pattern.FibrePattern | None = field(default=None, compare=False)

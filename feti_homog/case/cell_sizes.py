@@ -11,10 +11,10 @@ from math import ceil, fsum, inf, log, pi, sqrt
 
 import numpy as np
 
-from feti_homog.case.cell_section import LATTICES, Cell
+from feti_homog.case.cell_section import LATTICES, TOUCHING, Cell
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import limits, wording
+from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
 """Largest Poisson's ratio of linear triangles; above it they lock."""
@@ -199,6 +199,28 @@ def mixed_width(cell: Cell) -> float | None:
     return sqrt(filled / fsum(cell.fractions.values()))
 
 
+def size_faults(cell: Cell) -> list[str]:
+    """List the faults in fractions, radii, numbers of fibres and element sizes of a cell."""
+    faults, largest = list[str](), ("mesh_size", cell.mesh_size)
+    if cell.fibre_fraction is not None:
+        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
+        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
+        if cell.fibre_fraction >= limit:
+            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
+            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
+            faults.append(
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
+                f"{wording.limit_in_words(limit, cell.fibre_fraction, 4)} for "
+                f"geometry = {wording.toml_value(cell.geometry)}: {reason}"
+            )
+    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
+        if size is not None and size > largest[1]:
+            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        elif size is not None:
+            largest = name, size
+    return faults + mix_faults(cell)
+
+
 def mix_faults(cell: Cell) -> list[str]:
     """List contradictions between fractions, radii and numbers of fibres in a mix."""
     if cell.mix is None:
@@ -214,8 +236,8 @@ def mix_faults(cell: Cell) -> list[str]:
     if faults:
         return faults
     expected_counts = _expected_counts(cell)
-    if (count := fsum(expected_counts.values())) > limits.FIBRES:
-        words = f"expected at most {limits.FIBRES}, of larger radii or a smaller cell"
+    if (count := fsum(expected_counts.values())) > types.MOST_FIBRES:
+        words = f"expected at most {types.MOST_FIBRES}, of larger radii or a smaller cell"
         return [f"{given}: makes {count:.2g} fibres; {words}"]
     return [
         f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5, of more fibres or a wider cell"

@@ -7,7 +7,7 @@ from typing import Any
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.schema import key, limits, types
+from feti_homog.schema import key, types
 
 pair_key = partial(key, by_pair=True)
 """Return a key in which several [[interface]] sections may differ; they agree in all other keys."""
@@ -55,7 +55,7 @@ class Scatter:
     )
 
 
-ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}", most=limits.ROWS)
+ARCS = types.list_of(types.table_of(Arc, ""), "a list of arcs {fibre, centre, angle}", most=types.MOST_ROWS)
 
 
 @dataclass(frozen=True, kw_only=True)

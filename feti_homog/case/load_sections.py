@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from feti_homog.case import section_values as kinds
 from feti_homog.materials import voigt
-from feti_homog.schema import key, keys, limits, types
+from feti_homog.schema import key, keys, types
 
 TEMPERATURE = "temperature"
 Strain = tuple[float, ...]
@@ -64,7 +64,7 @@ WAYPOINTS = types.list_of(
     types.either("", kinds.STRAIN, LOAD),
     f"a list of strains {kinds.STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
     least=1,
-    most=limits.ROWS,
+    most=types.MOST_ROWS,
 )
 
 

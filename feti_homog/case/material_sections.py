@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.materials import laws, material_forms, strength, voigt
+from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
@@ -99,7 +99,7 @@ def _read_material(
     if material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
         if material.strength is not None and plane != voigt.CONDUCTION.name:
-            checks += [lambda material: strength.criterion(material.strength), partial(_known_stress, plane=plane)]
+            checks += [lambda m: material_forms.criterion(m.strength), partial(_known_stress, plane=plane)]
         for check in (*checks, laws.expansion):
             try:
                 check(material)

@@ -12,7 +12,7 @@ from feti_homog.case.interface_section import InterfaceSection, Scatter, interfa
 from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
 from feti_homog.materials import material_forms, voigt
-from feti_homog.schema import TableReader, keys, limits, wording
+from feti_homog.schema import TableReader, keys, types, wording
 
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
@@ -92,8 +92,8 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
     tables = interface_tables(document)
     if document.get("interface") == []:
         reader.faults.append("interface = []: expected a section [interface]")
-    elif len(tables) > limits.SECTIONS:
-        reader.faults.append(f"[[interface]]: {len(tables)} sections; expected at most {limits.SECTIONS}")
+    elif len(tables) > types.MOST_SECTIONS:
+        reader.faults.append(f"[[interface]]: {len(tables)} sections; expected at most {types.MOST_SECTIONS}")
         return None
     labels = [interface_label(n, len(tables)) for n in range(len(tables))]
     interfaces: list[InterfaceSection] = []

@@ -9,15 +9,14 @@ from typing import Any
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
-from feti_homog.case.cell_files import FEWEST_MATCHED
-from feti_homog.case.cell_section import MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
+from feti_homog.case.cell_section import FEWEST_MATCHED, MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
 from feti_homog.case.sections import DIFFERENTIABLE, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.errors import MOST_FAULTS
 from feti_homog.materials import voigt
-from feti_homog.schema import keys, limits, types, wording
+from feti_homog.schema import keys, types, wording
 
 TablePath = tuple[str, ...]
 ITEMS = "items"
@@ -57,14 +56,14 @@ class Rule:
         if not all(condition.holds(selected) for condition in self.when):
             return
         content = document.get(self.path[0]) if self.path else document
-        sections = content[: limits.SECTIONS] if isinstance(content, list) else [content]
+        sections = content[: types.MOST_SECTIONS] if isinstance(content, list) else [content]
         label = " ".join(self.path[:1])
         matches = [(f"{label} {k}" if len(sections) > 1 else label, "", each) for k, each in enumerate(sections, 1)]
         for step in self.path[1:]:
             parents, matches = matches, []
             for name, place, parent in parents:
                 if step == ITEMS and isinstance(parent, list):
-                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: limits.ROWS])]
+                    matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: types.MOST_ROWS])]
                 elif isinstance(parent, dict) and step in parent:
                     matches.append((name, f"{place}.{step}" if place else step, parent[step]))
         faulty = (match for match in matches if not (match[2] is None or (self.holds and self.holds(match[2]))))

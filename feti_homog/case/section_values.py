@@ -11,7 +11,6 @@ from feti_homog.microstructure import phase_names
 from feti_homog.schema import keys, types
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
-PAIR_EXAMPLE = '["coating", "matrix"]'
 SEED = types.integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk", ".mesh")
@@ -82,16 +81,16 @@ VOIDS_OF_A_RANDOM_CELL = types.real(least=0.0, most=0.5)
 VOIDS = types.either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, types.boolean)
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", types.real(least=1e-9, most=1e9))
 FIBRE = types.integer(least=1)
-_FIBRES = types.list_of(FIBRE, "", least=1)
 FIBRES = replace(
     types.either(
-        'the number of a fibre, counted from 1, a list of numbers, or "all"', types.choice("all"), FIBRE, _FIBRES
+        'the number of a fibre, counted from 1, a list of numbers, or "all"',
+        *(types.choice("all"), FIBRE, types.list_of(FIBRE, "", least=1)),
     ),
     store=lambda value: value if value == "all" else tuple(value if isinstance(value, list) else [value]),
 )
 KEPT = types.integer(least=2, most=10**9)
 STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", "peaks"), KEPT)
-PAIR = types.list_of(types.text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
+PAIR = types.list_of(types.text, 'the names of two phases, such as ["coating", "matrix"]', count=2, unique=True)
 STRENGTH, STIFFNESS, CONDUCTANCE = map(_positive_or_inf, ("a traction", "a stiffness", "a conductance"))
 TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
 NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2, most=1000)

@@ -14,11 +14,10 @@ from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_sections import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
 from feti_homog.case.section_values import ANALYSIS_TYPE, MECHANICAL, PATH_ANALYSIS, SEED, STATES
 from feti_homog.materials import material_forms
-from feti_homog.schema import key, keys, limits, types, wording
+from feti_homog.schema import key, keys, types, wording
 
 Scalar = str | int | float | bool
 
-PREFIXED = r"feti_\w+"  # options of [petsc]
 OPTION_EXPECTED = "a string, a number, true or false"
 SWEEP = "sweep"
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
@@ -40,7 +39,7 @@ RANGE_KEYS = {
     "to": keys.Key(types.real(), "Last value.", required=True),
     "step": keys.Key(types.real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
     "count": keys.Key(
-        types.integer(least=2, most=limits.ROWS),
+        types.integer(least=2, most=types.MOST_ROWS),
         "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
     "scale": keys.Key(
@@ -61,7 +60,7 @@ class SweepSection:
         default="grid",
     )
     samples: int | None = key(
-        types.integer(least=1, most=limits.ROWS),
+        types.integer(least=1, most=types.MOST_ROWS),
         "Number of points in the box of the ranges that have neither step nor count.",
         default=None,
     )
@@ -70,13 +69,10 @@ class SweepSection:
     )
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
-        types.integer(least=1, most=limits.ROWS),
+        types.integer(least=1, most=types.MOST_ROWS),
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )
-
-
-OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +149,7 @@ class Output:
     pictures: bool = key(types.boolean, "Draw PNG files, without fields curves alone.", default=True, presentation=True)
     report: bool = key(types.boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
-        types.choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
+        types.choice("auto", "S11", "S22", "S12", "S33", "S23", "S13"),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
         "plane strain.",
         default="auto",
@@ -293,7 +289,7 @@ def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
         start = f"[petsc] {wording.toml_key(name)} = {wording.toml_value(value)}: expected"
         if name.startswith("-"):
             faults.append(f"{start} the option's name without its dash")
-        elif not re.fullmatch(PREFIXED, name):
+        elif not re.fullmatch(r"feti_\w+", name):
             faults.append(f"{start} the prefix feti_; PETSc's own options are for the command line")
         elif not (isinstance(value, bool) or types.is_number(value) or types.text.accepts(value)):
             faults.append(f"{start} {OPTION_EXPECTED}")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.schema import limits, wording
+from feti_homog.schema import types, wording
 from feti_homog.system.runtime import input_files
 
 MAX_DEPTH = 50
@@ -29,7 +29,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
-        content = input_files.read(path, limits.BYTES, pipes=True).decode("utf-8-sig")
+        content = input_files.read(path, types.MOST_BYTES, pipes=True).decode("utf-8-sig")
         if DEEP_KEY.search(content):
             raise RecursionError  # for tomllib takes time in the square of the length
         document = tomllib.loads(content)
@@ -75,7 +75,7 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> A
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, Mapping | list | tuple):
-        most, noun = (limits.KEYS, "keys") if isinstance(value, Mapping) else (limits.ENTRIES, "entries")
+        most, noun = (types.MOST_KEYS, "keys") if isinstance(value, Mapping) else (types.MOST_ENTRIES, "entries")
         if depth > MAX_DEPTH or len(value) > most:
             words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
             raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")

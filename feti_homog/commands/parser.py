@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 from typing import NoReturn
 
+from feti_homog import __version__
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
 from feti_homog.system.petsc import option_table
-from feti_homog.version import __version__
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 FIBRES_HELP = (

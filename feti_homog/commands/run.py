@@ -14,13 +14,12 @@ def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Run the case file in the arguments.  Collective."""
     from feti_homog.analysis import runner
     from feti_homog.results import output_folder
-    from feti_homog.system.runtime import progress_bar
 
     case = mpi_errors.on_root(comm, cases.load, arguments.case)
     if arguments.resume and not case.section.is_followed:
         raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
     mpi_errors.on_root(comm, output_folder.usable, arguments.out)
-    runner.run(case, arguments.out, progress_bar.Progress(comm, arguments.quiet), arguments.resume)
+    runner.run(case, arguments.out, standard_streams.Progress(comm, arguments.quiet), arguments.resume)
 
 
 def check(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -6,6 +6,6 @@ Imports `mesh`.  Main entry: `assembly.assemble`, the stiffness matrix and load 
 from feti_homog.fem.problem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Problem
 
 __all__ = [
-    "AXIAL", "CONDUCTION", "GENERALIZED", "PLANE", "Problem", "arc_error", "assembly", "bubble", "local_fits",
-    "point_fields", "shape_functions", "stress_recovery",
+    "AXIAL", "CONDUCTION", "GENERALIZED", "PLANE", "Problem", "arc_error", "assembly", "local_fits",
+    "shape_functions", "stress_recovery",
 ]  # fmt: skip

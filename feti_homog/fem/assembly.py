@@ -12,9 +12,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 
-from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.fem.shape_functions import gradients
+from feti_homog.fem.shape_functions import HESSIANS, MixedElements, affine_couples, gradients
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
@@ -49,7 +48,7 @@ def assemble(
     """Assemble the matrices of a subdomain with one or several materials.
 
     The first rows and columns of L belong to displacement strains, the last to uniform strains.  Quadratic elements
-    with isotropic stiffness in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
+    with isotropic stiffness in the plane may be mixed: with a bubble and a pressure (`MixedElements`).
 
     Args:
         laws: stiffness L (v, v), or (materials, v, v) with the `material` (t,) of every coarse triangle.
@@ -123,7 +122,7 @@ def _affine(
     products = macro.products
     if mixed is not None:
         products = np.concatenate([products, macro.hessians], axis=1)
-        pulled = np.concatenate([pulled, bubble.affine_couples(mixed, inverse, determinant[:, 0, 0])], axis=1)
+        pulled = np.concatenate([pulled, affine_couples(mixed, inverse, determinant[:, 0, 0])], axis=1)
     return products @ pulled, macro.integrals @ (determinant * inverse), float(w.sum())
 
 
@@ -137,7 +136,7 @@ def _curved(
     if mixed is None:
         couples = macro.couples(products(g, w)) @ tensor
     else:
-        couples = macro.couples(bubble.Elements.of(points, mixed).couples())
+        couples = macro.couples(MixedElements.of(points, mixed).couples())
     return couples, macro.nodes(integrals(g, w)), float(w.sum())
 
 
@@ -174,7 +173,7 @@ class MacroElement:
         couples: sums of the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: sums over the element nodes (4**refine, a) to the q lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) products of second derivatives (`fem.bubble`), summed over quadratic elements; else 0.
+        hessians: (p, 9) products of second derivatives (`MixedElements`), summed over quadratic elements; else 0.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 
@@ -194,7 +193,7 @@ class MacroElement:
         pair = elements[:, :, None] * q + elements[:, None, :]
         couples, nodes, pairs = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
         g, w = gradients(lattice.nodes[elements][..., 1:] / lattice.intervals)
-        second = np.einsum("ar,bs->abrs", bubble.HESSIANS, bubble.HESSIANS).reshape(-1, 9)
+        second = np.einsum("ar,bs->abrs", HESSIANS, HESSIANS).reshape(-1, 9)
         # Plane stiffness does not depend on the size, so that every element has the stiffness of the coarse triangle.
         of_all = np.tile(second, (len(elements), 1)) if lattice.order == 2 else np.zeros((pair.size, 9))
         return cls(

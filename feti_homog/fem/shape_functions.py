@@ -1,5 +1,15 @@
-"""Shape functions of linear and quadratic triangles and of the bubble, with gradients at the quadrature points."""
+"""Shape functions of linear and quadratic triangles, with gradients at the quadrature points, and mixed elements.
 
+Mixed elements are quadratic triangles with a cubic bubble and a discontinuous linear pressure (Crouzeix and Raviart
+1973).  The pressure is p = lambda Pi div u, where Pi projects on linear functions in reference coordinates.  Pressure
+and bubble are eliminated element by element, so that the element has the nodes of a quadratic triangle.  It does not
+lock where lambda exceeds the shear modulus mu.  Mean strains, mean stresses and loads under uniform strains equal the
+values of the quadratic triangle, because the bubble vanishes on the boundary and Pi keeps means.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -11,6 +21,12 @@ from feti_homog.typing import Float
 _C = np.array([0.445948490915965, 0.091576213509771])
 _P2_POINTS = np.stack([np.r_[1 - 2 * _C, _C, _C], np.r_[_C, 1 - 2 * _C, _C]], axis=1)
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
+BUBBLE = 6
+# Second derivatives (6, 3) of the shape functions by the reference coordinates: 11, 22 and 12.
+HESSIANS = np.array([[4, 4, 4], [4, 0, 0], [0, 4, 0], [-8, 0, -4], [0, 0, 4], [0, -8, -4]], float)
+# INTEGRAL = int b and int db/dr_r db/dr_s = GRADIENTS T_rs on the unit triangle; with Pi, PROJECTED times the latter.
+INTEGRAL, GRADIENTS, PROJECTED = 9 / 40, 81 / 40, 3 / 5
+T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 
 @cache
@@ -56,3 +72,172 @@ def shape_functions(nodes: int, lam: Float) -> Float:
     if nodes == 3:
         return lam
     return np.hstack([lam * (2 * lam - 1), 4 * lam * np.roll(lam, -1, axis=1)])
+
+
+def lame(L: Float) -> tuple[float, float]:
+    """Return lambda and mu of a stiffness (v, v) that is isotropic in the plane."""
+    return float(L[0, 1]), float(L[2, 2])
+
+
+def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
+    """Compute the bubble contribution X (t, 9, 4) to the affine element stiffness.
+
+    It adds H_a,r H_b,s X_(r s)(i j) to K_(a i)(b j) for the `HESSIANS` H.  The stress of a quadratic u has a constant
+    divergence f on an affine element, and div u is linear.  So the bubble force is -int b f, and pressure changes only
+    the bubble stiffness:  K_bb = det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m),  m = inverse^T T inverse.
+
+    Args:
+        L: (v, v) stiffness, isotropic in the plane.
+        inverse, determinant: dr_r / dx_k (t, 2, 2) and det dx/dr (t,).
+    """
+    first, shear = lame(L)
+    metric = inverse.transpose(0, 2, 1) @ T @ inverse
+    trace = np.trace(metric, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    stiffness = GRADIENTS * (shear * trace + (shear + PROJECTED * first) * metric)
+    outer = np.einsum("trk,tsl->tklrs", inverse, inverse)
+    second = np.stack([outer[..., 0, 0], outer[..., 1, 1], outer[..., 0, 1] + outer[..., 1, 0]], axis=-1)
+    divergence = (first + shear) / 2 * (second + second.transpose(0, 2, 1, 3))
+    for i in range(2):
+        divergence[:, i, i] += shear * (second[:, 0, 0] + second[:, 1, 1])
+    forces = INTEGRAL * divergence.reshape(-1, 2, 6)
+    eliminated = forces.transpose(0, 2, 1) @ np.linalg.solve(stiffness, forces) * determinant[:, None, None]
+    return np.asarray(-eliminated.reshape(-1, 2, 3, 2, 3).transpose(0, 2, 4, 1, 3).reshape(-1, 9, 4))
+
+
+@dataclass(frozen=True)
+class MixedElements:
+    """Mixed elements of any shape, with a stiffness that is isotropic in the plane.
+
+    Attributes:
+        lame: lambda and mu.
+        gradients, weights: gradients (e, q, 7, 2) of the shape functions, the bubble last, and weights (e, q).
+        projected: (e, q, 7, 2) Pi dN_a/dx_i at the quadrature points: Pi div u = projected : u.
+    """
+
+    lame: tuple[float, float]
+    gradients: Float
+    weights: Float
+    projected: Float
+
+    @classmethod
+    def of(cls, points: Float, L: Float) -> MixedElements:
+        """Compute the gradients and weights of mixed elements with the nodes (e, 6, 2)."""
+        g, w = gradients(points, with_bubble=True)
+        linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
+        mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
+        moments = (linear.T * w[:, None]) @ g.reshape(e, q, 2 * a)
+        return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
+
+    def couples(self) -> Float:
+        """Compute the nodal stiffness (e, 6, 6, 4), with (i, j) flat."""
+        K, n = self._stiffness(slice(None)), 2 * BUBBLE
+        nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
+        return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
+
+    def with_bubble(self, u: Float) -> Float:
+        """Append the bubble displacement to nodal displacements (e, 6, 2, k), and return all (e, 7, 2, k)."""
+        K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
+        bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
+        return np.concatenate([u, -bubble[:, None]], axis=1)
+
+    def strain(self, u: Float) -> Float:
+        """Compute strains (e, q, 3, k) under displacements (e, 7, 2, k)."""
+        e, q, a, _ = self.gradients.shape
+        slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
+        slope = slope.reshape(e, q, 2, 2, -1)
+        shear = slope[:, :, 1, 0] + slope[:, :, 0, 1]
+        return np.stack([slope[:, :, 0, 0], slope[:, :, 1, 1], shear], axis=2)
+
+    def dilatation(self, u: Float) -> Float:
+        """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
+        e, q, a, _ = self.gradients.shape
+        return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
+
+    def stress(self, u: Float) -> Float:
+        """Compute stresses 2 mu eps + p, (e, q, 3, k), under displacements (e, 7, 2, k)."""
+        first, shear = self.lame
+        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
+        stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
+        return np.asarray(stress)
+
+    def _stiffness(self, functions: slice) -> Float:
+        """Compute the stiffness rows (e, 2n, 14) of n shape functions, with the bubble:
+
+        mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
+        """
+        (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
+        flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
+        weighted, projected = (
+            (weights * field[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
+            for field in (self.gradients, self.projected)
+        )
+        products = (weighted @ flat).reshape(e, -1, 2, a, 2)
+        K = shear * products.transpose(0, 1, 4, 3, 2)
+        along = shear * (products[:, :, 0, :, 0] + products[:, :, 1, :, 1])
+        for i in range(2):
+            K[:, :, i, :, i] += along
+        return np.asarray(K.reshape(e, -1, 2 * a) + first * projected @ flat)
+
+
+@dataclass(frozen=True)
+class PointFields:
+    """The fields in e elements at q quadrature points, with components in the order [11, 22, 12].
+
+    Attributes:
+        gradients, weights: gradients (e, q, a, 2) of the shape functions, a bubble last, and weights (e, q).
+        u: (e, a, 2) displacements, in mixed elements also of the bubble.
+        strain, stress: (e, q, 3) strains and stresses.
+        density: (e, q) strain energy density: sigma : eps / 2, plus p (div u - p / lambda) / 2 in mixed elements.
+    """
+
+    gradients: Float
+    weights: Float
+    u: Float
+    strain: Float
+    stress: Float
+    density: Float
+
+
+def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
+    """Compute the fields in elements with nodes and displacements (e, a, 2), and with the stiffness L (3, 3)."""
+    if not is_mixed:
+        g, weights = gradients(points)
+        strain = voigt(np.einsum("eai,eqad->eqid", u, g))
+        stress = strain @ L
+        return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
+    elements = MixedElements.of(points, L)
+    inner = elements.with_bubble(u[..., None])
+    strain, stress, mean = (field(inner)[..., 0] for field in (elements.strain, elements.stress, elements.dilatation))
+    off = strain[..., 0] + strain[..., 1] - mean
+    density = ((stress * strain).sum(axis=2) + elements.lame[0] * mean * off) / 2
+    return PointFields(elements.gradients, elements.weights, inner[..., 0], strain, stress, density)
+
+
+def voigt(gradient: Float) -> Float:
+    """Return the strains [11, 22, 12] (e, q, 3) of displacement gradients (e, q, 2, 2)."""
+    shear = gradient[..., 0, 1] + gradient[..., 1, 0]
+    return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
+
+
+def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
+    """Compute the energy rate of elements whose nodes and displacements change.
+
+    With nodes at x + s dx and displacements u + s du, the rate d/ds sum_e int W at s = 0 is
+
+        int sigma : (grad du - grad u grad dx) + W div dx,
+
+    exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): the bubble and the pressure of mixed
+    elements stay constant, because the energy is stationary in both.
+
+    Args:
+        points, u: (e, a, 2) element nodes and their displacements.
+        L: (3, 3) stiffness.
+        moved, changed: (e, a, 2) dx and du.
+        is_mixed: whether the elements have a bubble and a pressure.
+    """
+    fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
+    grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)
+    of_nodes = fields.gradients[:, :, :nodes]
+    grad_moved, grad_changed = (np.einsum("eai,eqad->eqid", field, of_nodes) for field in (moved, changed))
+    change = (fields.stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
+    return float((fields.weights * (change + fields.density * np.trace(grad_moved, axis1=2, axis2=3))).sum())

@@ -13,11 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
-from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
+from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions
 from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
@@ -117,7 +116,7 @@ class RecoveredStress:
         m, nodes = self.problem.strains, self.triangles[part]
         corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
-            elements = bubble.Elements.of(corners, self.L)
+            elements = MixedElements.of(corners, self.L)
             stress, weights = elements.stress(elements.with_bubble(u)), elements.weights
         else:
             g, weights = gradients(corners)

@@ -3,7 +3,7 @@
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.linalg`, `feti.operators`, `mesh` and `system`.
 Main entry: `solver.FetiSolver`.  The floors of this package; imports point downwards:
 
-    solver, factory, solver_plan, krylov, dual_solution, confirmation
+    solver, solver_plan, krylov, dual_solution, confirmation
     coarse           natural coarse space; adaptive coarse space and its preconditioner
     exact            exact inverses of F from influence columns
     operators        S and S+ of subdomains, the dual operator F, preconditioners without a coarse space
@@ -15,4 +15,4 @@ Main entry: `solver.FetiSolver`.  The floors of this package; imports point down
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 
-__all__ = ["DualSolution", "FetiSolver", "factory", "solver_plan", "thresholds"]
+__all__ = ["DualSolution", "FetiSolver", "solver_plan", "thresholds"]

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.fem import PLANE, Problem
-from feti_homog.feti import factory
+from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -32,7 +32,7 @@ from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MOST_DOFS_UNTRIMMED, Thresholds
 from feti_homog.mesh import ReferenceLattice
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 from feti_homog.typing import Float
 
 
@@ -72,19 +72,19 @@ class FetiSolver:
     ) -> None:
         """Factor the subdomains and the coarse problem.  Collective.
 
-        `applications`, the expected number of products with F, `recovers`, and exceptions are as in `factory.build`.
+        `applications`, the expected number of products with F, `recovers` and exceptions are as in `solver_plan.build`.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
         self.intact_compliance = compliance = springs.compliance(self.jump_operator)
         options = applications, compliance, springs.soften, thresholds, recovers
-        parts = factory.build(comm, self.jump_operator, subdomains, *options)
+        parts = solver_plan.build(comm, self.jump_operator, subdomains, *options)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
         self.exact_inverse, self.method = parts.exact_inverse, parts.method
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.interface_operators, compliance)
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
-            process_memory.trim()
+            process.trim_memory()
         self.active = ActiveRows(self.rows)
         self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None

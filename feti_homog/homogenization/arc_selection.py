@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case import Case, interface_section
+from feti_homog.homogenization.cell_remarks import LEAST_SIZE
 from feti_homog.interface import debonded_arcs
 from feti_homog.mesh import ReferenceLattice, Torus
+from feti_homog.mesh.fill import element_estimate
 from feti_homog.mesh.outline import outline
-from feti_homog.mesh.sizes import element_estimate
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
@@ -20,7 +21,6 @@ from feti_homog.typing import Bool, Float, Int
 TIP_SHARE = 0.5
 # Largest default ratio of the triangles that tips add to the triangles of a mesh for several openings.
 TIP_TRIANGLES = 2.0
-LEAST_SIZE = 1e-5  # least default element size at tips / cell width
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
@@ -92,7 +92,7 @@ class EstimatedNodes:
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
         """Return the tips that the mesher moved to vertices, by interface; none in a user's mesh."""
         if case.cell.has_own_mesh:
-            return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
+            return ({},) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             candidate = self.is_vertex & (self.pair == pair)
@@ -101,10 +101,21 @@ class EstimatedNodes:
         return tuple(moved)
 
 
-def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.MovedTips]) -> list[str]:
-    """List the arcs, and the nonzero [angle] openings, that select no node."""
+def checked(
+    case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
+) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
+    """Return the moved tips by interface, and the `faults` of the case with the faults of arcs.
+
+    An arc may lie on a fibre that cannot have it.  Without other faults, arcs and nonzero [angle] openings that select
+    no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.
+    """
+    lines, moved = list(faults), nodes.moved_tips(case, len(centres))
+    for pair, interface in enumerate(case.interfaces):
+        label = interface_section.interface_label(pair, len(case.interfaces))
+        lines += debonded_arcs.faults(interface.debonded, centres, label)
+    if lines:
+        return moved, lines
     openings: Sequence[float | None] = case.section.openings or [None]
-    lines = []
     for pair, interface in enumerate(case.interfaces):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
         label = interface_section.interface_label(pair, len(case.interfaces))
@@ -122,4 +133,4 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = f"no node of {whose} is within the arc of {angle} degrees"
                 lines.append(f"{line}: {words}; make it wider, or the elements smaller")
-    return list(dict.fromkeys(lines))
+    return moved, list(dict.fromkeys(lines))

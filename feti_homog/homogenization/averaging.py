@@ -87,20 +87,22 @@ class Homogenization:
     """The averages over a torn cell with interfaces.
 
     Attributes:
-        law: bond law, without the energies released at tips.
+        law: bond law, without the energies released at tips; None without [interface].
         interface: the contact problem.
     """
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
-        self.law = cell.bond_law
-        self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
+        self.law = cell.bond_law if cell.case.interfaces else None
+        softening = None if self.law is None else self.law.softening
+        self.interface = ContactProblem(cell.solver, contact, size, softening)
 
     @property
     def intact(self) -> BondState:
         """The interface state in which all bonds hold."""
         nodes = len(self.interface.nodes.row)
-        return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes), np.zeros(nodes, bool))
+        history = np.zeros((nodes, 0)) if self.law is None else self.law.begin(nodes)
+        return BondState(np.zeros(nodes, np.int8), history, np.zeros(nodes, bool))
 
     @property
     def loads(self) -> tuple[str, ...]:
@@ -187,7 +189,7 @@ class Homogenization:
 
     def damage(self, bonds: BondState) -> Float:
         """Return the bond damage (k,), from 0, intact, to 1, broken."""
-        damage = self.law.damage(bonds)
+        damage = None if self.law is None else self.law.damage(bonds)
         return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:

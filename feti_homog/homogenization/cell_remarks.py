@@ -6,7 +6,6 @@ import numpy as np
 
 from feti_homog.case import Case, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.arc_selection import LEAST_SIZE
 from feti_homog.materials import engineering_constants, laws
 from feti_homog.mesh import Torus, submeshes
 from feti_homog.schema import wording
@@ -19,6 +18,7 @@ SAME_RATIO = 0.01
 RESOLVED = 0.5
 # The ratio for cohesive laws, whose tractions fall along the process zone.
 RESOLVED_SOFTENING = 1 / 3
+LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on interfaces / cell width
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
@@ -103,7 +103,9 @@ def case_remarks(case: Case) -> tuple[str, ...]:
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
         return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
-        levels = getattr(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)), "levels", ())
+        from feti_homog.interface.laws import law_of_sections  # few laws have teeth
+
+        levels = getattr(law_of_sections(case.interfaces, np.zeros(0, np.int64)), "levels", ())
         remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "
         lines = (f"{remark}{len(levels) - 1} teeth a bond",) if len(levels) else ()
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
@@ -183,7 +185,9 @@ def _law_warnings(case: Case) -> list[str]:
     """Warn if the cohesive energy depends on the order of modes, and if teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
-    lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
+    from feti_homog.interface.laws import law_of_sections  # few laws soften
+
+    lines, law = [], law_of_sections(case.interfaces, np.zeros(0, np.int64))
     for number, bond in enumerate(case.interfaces):
         stiffness, strength, toughness = (
             getattr(bond, f"tangential_{kind}") / getattr(bond, f"normal_{kind}")

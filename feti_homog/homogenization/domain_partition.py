@@ -1,14 +1,14 @@
 """Cut the cell on rank 0, from the coarse mesh to the submeshes of each rank."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case, interface_section
+from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import arc_selection, cell_remarks, partition_policy
-from feti_homog.interface import debonded_arcs
+from feti_homog.homogenization import cell_remarks, partition_policy
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, coarse_mesh, mesh_fibres, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.tiles import tile_filling
@@ -56,7 +56,7 @@ class CellSummary:
     centres: Float
     radii: Float
     frames: Float
-    moved_tips: tuple[debonded_arcs.MovedTips, ...]
+    moved_tips: tuple[Mapping[tuple[int, float], float], ...]
     snapped: float
     origin: tuple[float, float]
     voids: int
@@ -133,13 +133,12 @@ def distribute(
     circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
     centres = in_cell(circles[:, :2], mesh.period) if mesh.boundary == "periodic" else circles[:, :2]
     faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
-    moved = (debonded_arcs.NOT_MOVED,) * (count := len(case.interfaces))
-    for pair, bond in enumerate(case.interfaces):
-        faults += debonded_arcs.faults(bond.debonded, centres[is_fibre], interface_section.interface_label(pair, count))
-    if case.arcs and not faults:
+    moved: tuple[Mapping[tuple[int, float], float], ...] = ({},) * len(case.interfaces)
+    if case.arcs:
+        from feti_homog.homogenization import arc_selection  # other cells have no tips
+
         nodes = arc_selection.EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
-        moved = nodes.moved_tips(case, int(is_fibre.sum()))
-        faults = arc_selection.faults(case, nodes, moved)
+        moved, faults = arc_selection.checked(case, nodes, centres[is_fibre], faults)
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()

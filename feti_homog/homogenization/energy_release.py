@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from feti_homog.fem import assembly, point_fields
+from feti_homog.fem import assembly, shape_functions
 from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
@@ -74,7 +74,7 @@ class CrackExtension:
         total = u.reshape(-1, 2)[mesh.node_class[nodes]] + offset @ E
         moved, changed = fraction * ((offset + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
         s = self.subdomain
-        return point_fields.energy_change(points, total, s.L[:3, :3], moved, changed, s.is_mixed)
+        return shape_functions.energy_change(points, total, s.L[:3, :3], moved, changed, s.is_mixed)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,6 @@ from feti_homog.typing import Float, Int
 if TYPE_CHECKING:
     from feti_homog.homogenization.cut_bodies import SharedVertices
 
-Members = list[Subdomain] | list[UniformPart]
 # Ratios of element and arc errors to the errors on coarser meshes (`scripts/measure_mesh_error.py --factors`).  NESTED:
 # one and two halvings less, by element order.  LOCKED: cells with a phase that locks, for quadratic elements from true
 # errors.  SAMPLED: one halving less, with fine displacements at the coarse nodes, by whether elements have bubbles.
@@ -151,7 +150,7 @@ def _recovered(
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
-    solved = list[tuple[Members, FineMesh, Float, Int]]()
+    solved = list[tuple[list[Subdomain] | list[UniformPart], FineMesh, Float, Int]]()
     if is_nested and not across:
         for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
             displacement = interior.displacement(u, loads)

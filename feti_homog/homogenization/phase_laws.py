@@ -1,4 +1,4 @@
-"""The problems on the plane mesh, with phase stiffnesses, springs and bond laws.
+"""The problems on the plane mesh, with phase stiffnesses, springs and bond strengths.
 
 In generalized plane strain the plane problem has the loads e = [E11, E22, gamma12, E33, T] with a temperature change
 T, and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] with the
@@ -6,24 +6,18 @@ conjugate to T, and 1/2 e.A e is the stored energy.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
+from feti_homog.case import Case, bond_laws, cell_sizes
 from feti_homog.fem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Problem
 from feti_homog.feti.decomposition import jump_operator
-from feti_homog.interface.laws import BondLaw, law_class
-from feti_homog.materials import laws, material_derivatives, voigt
-from feti_homog.typing import Float, Int
+from feti_homog.materials import laws, voigt
+from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR, GRADIENT = [0, 1, 5, 2], [4, 3], [4, 3, 2]
 """Indices among the six strains in space: of the plane problem with E33, of axial shear, of conduction."""
-# Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
-# factor too, and the process zone keeps its length.
-POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
@@ -63,9 +57,12 @@ def is_mixed(case: Case, phase: str) -> bool:
     return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
-def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChange) -> tuple[Float, ...]:
-    """Differentiate `law` in the plane problem and, if present, in the axial problem."""
-    problem, dC = problems(case)[0], change.stiffness
+def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tuple[Float, ...]:
+    """Differentiate `law` in the plane problem and, if present, in the axial problem.
+
+    `dC` and `expansion` (6,) are the derivatives of the stiffness and the expansion of the phase.
+    """
+    problem = problems(case)[0]
     if problem in (PLANE, CONDUCTION):
         return (dC,)
     axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
@@ -75,7 +72,7 @@ def law_derivatives(case: Case, phase: str, change: material_derivatives.LawChan
         return dC, axial
     C = laws.spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
     N, dN = np.column_stack([np.eye(4), -alpha[IN_PLANE]]), np.zeros((4, 5))
-    dN[:, 4] = -change.expansion[IN_PLANE]
+    dN[:, 4] = -expansion[IN_PLANE]
     mixed = N.T @ C @ dN
     return N.T @ dC @ N + mixed + mixed.T, axial
 
@@ -148,41 +145,6 @@ def strength_factors(case: Case, fibres: int) -> Float:
     from feti_homog.microstructure import periodic_table  # imports the windows of tables
 
     return factors * table.strength[periodic_table.fibre_rows(table, case.cell.window)]
-
-
-@dataclass(frozen=True)
-class SectionValues:
-    """The values of keys from the [interface] sections `pair` (k,) at nodes (k,).
-
-    The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
-    """
-
-    bonds: Sequence[interface_section.InterfaceSection]
-    pair: Int
-    factor: float | Float
-
-    def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the value of the first key that is set, a number or (k,); inf if no key is set."""
-        sections = self.everywhere(key, *more)
-        values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
-        power = POWERS.get(key.rpartition("_")[2], 0)
-        return values * self.factor**power if power else values
-
-    def everywhere(self, key: str, *more: str) -> Float:
-        """Return the values (s,) in all sections, for the factor 1."""
-        names = (key, *more)
-        values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
-        return np.array(values or [math.inf], float)
-
-    def common(self, key: str) -> Any:
-        """Return the value of a key that all sections share."""
-        return getattr(self.bonds[0], key)
-
-
-def bond_law(bonds: Sequence[interface_section.InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
-    name = bonds[0].criterion if bonds else bond_laws.DEFAULT
-    return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 
 
 def has_process_zone(case: Case) -> bool:

@@ -14,7 +14,7 @@ from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import laws, material_forms, strength, voigt
+from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.typing import Float
 
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
@@ -165,7 +165,7 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
         principal[near] = voigt.spatial_principal(in_plane[near], S33[near], shears[near])[:, 0]
     values = [principal, von_mises, hydrostatic]
     if material.strength is not None:
-        values += [*strength.utilisation(material.strength, stress, principal, von_mises).T]
+        values += [*material_forms.utilisation(material.strength, stress, principal, von_mises).T]
     return np.asarray(np.stack(values, axis=1))
 
 

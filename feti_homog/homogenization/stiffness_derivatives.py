@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case import Case, cell_section, material_sections
-from feti_homog.fem import CONDUCTION, Problem, assembly, bubble, shape_functions
+from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
@@ -55,7 +55,8 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
     for phase in integrals[0][0]:
         for change in material_derivatives.law_changes(case.materials[phase], case.analysis.plane):
             if is_heated or not change.name.startswith("expansion"):
-                pairs = zip(phase_laws.law_derivatives(case, phase, change), integrals, strict=True)
+                laws = phase_laws.law_derivatives(case, phase, change.stiffness, change.expansion)
+                pairs = zip(laws, integrals, strict=True)
                 energies = tuple(np.einsum("ab,aibj->ij", dA, grams[phase]) / area for dA, (grams, _) in pairs)
                 changes.append(Derivative(f"material.{phase}.{change.name}", change.value, energies))
     springs = list[Float]()
@@ -146,7 +147,7 @@ class _Fields:
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
         """Compute the fields in elements from nodes (e, a), u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
-        elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
+        elements = shape_functions.MixedElements.of(points, s.L) if s.is_mixed else None
         g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
         u = u if elements is None else elements.with_bubble(u)
         slopes = g.transpose(0, 1, 3, 2).reshape(len(g), -1, g.shape[2]) @ u.reshape(*u.shape[:2], -1)

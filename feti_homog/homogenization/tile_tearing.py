@@ -15,15 +15,14 @@ from mpi4py import MPI
 from feti_homog.case import Case, cases
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import arc_selection, cell_remarks
+from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.domain_partition import RankShare, distribute, summary_of
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, Torus, arrange, periodic_topology, submeshes
-from feti_homog.mesh.fill import gmsh_mesher
-from feti_homog.mesh.outline import lines
-from feti_homog.mesh.sizes import element_estimate, graded_size
+from feti_homog.mesh.fill import element_estimate, gmsh_mesher
+from feti_homog.mesh.outline import graded_size, lines
 from feti_homog.mesh.tiles import tile_filling, tiling
-from feti_homog.system.parallel import distributed_arrays, dividing, mpi_errors
+from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Int
 
 
@@ -79,8 +78,13 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
     else:
         listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)
-        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
-        cell = gmsh_mesher.begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+        section, marks = case.cell, dict[int, list[float]]()
+        if case.arcs:
+            from feti_homog.homogenization import arc_selection  # other cells have no tips
+
+            section = replace(section, tip_size=arc_selection.size(case, estimate))
+            marks = arc_selection.marks(case, estimate.fibres)
+        cell = gmsh_mesher.begin(section, listed, marks, policy)
     cases.check_phases(case, cell.phases)
     return cell
 
@@ -105,7 +109,7 @@ def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[
     """Deal the tiles on rank 0; return the numbers and tiles of this rank.  Collective."""
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
-    for k, rank in enumerate(dividing.balanced(loads, comm.size).tolist()):
+    for k, rank in enumerate(distributed_arrays.balanced(loads, comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
     return distributed_arrays.scatter(comm, parts)
 

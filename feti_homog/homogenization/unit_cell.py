@@ -19,17 +19,16 @@ from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.homogenization.uniform_parts import UniformPart, locks
-from feti_homog.interface import debonded_arcs
-from feti_homog.interface.laws import BondLaw
 from feti_homog.mesh import ReferenceLattice, Submesh, submeshes
 from feti_homog.microstructure import phase_names
 from feti_homog.system.parallel import mpi_errors
-from feti_homog.system.runtime import progress_bar
+from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
     from feti_homog.feti.decomposition import interface_neighbours
     from feti_homog.homogenization.spring_errors import SpringSides
+    from feti_homog.interface.laws import BondLaw
 
 
 @dataclass(frozen=True)
@@ -136,14 +135,18 @@ class TornCell:
     @cached_property
     def bond_law(self) -> BondLaw:
         """The bond law at this rank's interface nodes."""
+        from feti_homog.interface.laws import law_of_sections  # bonded cells need no law
+
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
         factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
-        return phase_laws.bond_law(self.case.interfaces, nodes.pair, factor)
+        return law_of_sections(self.case.interfaces, nodes.pair, factor)
 
     @cached_property
     def directions(self) -> Float:
         """The directions (k,) in degrees from fibre centres to this rank's interface nodes."""
+        from feti_homog.interface import debonded_arcs
+
         nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.shift)
 
@@ -163,9 +166,12 @@ class TornCell:
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)
-        for pair, (interface, moved) in enumerate(zip(self.case.interfaces, self.summary.moved_tips, strict=True)):
-            inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
-            is_debonded |= inside & (nodes.pair == pair)
+        if self.case.arcs:
+            from feti_homog.interface import debonded_arcs  # few cells have arcs
+
+            for pair, (interface, moved) in enumerate(zip(self.case.interfaces, self.summary.moved_tips, strict=True)):
+                inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
+                is_debonded |= inside & (nodes.pair == pair)
         return np.asarray(is_debonded)
 
     def areas(self) -> dict[str, float]:
@@ -182,10 +188,6 @@ class TornCell:
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
 
-    def sum_over_ranks(self, number: int) -> int:
-        """Sum a number over all ranks.  Collective."""
-        return int(self.comm.allreduce(number))
-
     def destroy(self) -> None:
         """Free the solvers.  Collective."""
         for cell in self.problems:
@@ -195,7 +197,7 @@ class TornCell:
 def tear(
     case: Case,
     comm: MPI.Intracomm,
-    progress: progress_bar.Progress,
+    progress: standard_streams.Progress,
     limits: thresholds.Thresholds = thresholds.DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
@@ -236,7 +238,7 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 
 
 def assemble_subdomains(
-    case: Case, comm: MPI.Intracomm, progress: progress_bar.Progress, policy: PartitionPolicy = DEFAULT_POLICY
+    case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
 

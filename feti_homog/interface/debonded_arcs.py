@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -23,7 +22,7 @@ TIP_TOLERANCE_DEGREES = 1e-6
 DIRECTION_DIGITS = 9
 # Fibre number and direction of a tip, as from `tips` -> direction of the tip in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
-NOT_MOVED: MovedTips = MappingProxyType({})
+NOT_MOVED: MovedTips = {}
 
 
 class InterfaceChains:

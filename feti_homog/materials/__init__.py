@@ -5,6 +5,5 @@ Imports `schema` and `system`.  Main entries: `material_forms`, `laws`, `enginee
 """
 
 __all__ = [
-    "engineering_constants", "estimates", "laws", "material_derivatives", "material_forms", "phase_bounds", "strength",
-    "voigt",
+    "engineering_constants", "estimates", "laws", "material_derivatives", "material_forms", "phase_bounds", "voigt",
 ]  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
+from feti_homog.schema import types
 
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
@@ -64,8 +65,8 @@ def random_arrangement(
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     void_radius = float(radii.mean()) * (1.0 if cell.void_radius is None else cell.void_radius)
     if voids := max(1, round(cell.voids / (pi * void_radius**2))) if cell.voids else 0:
-        if voids > cell_section.MOST_FIBRES:
-            bound = f"expected at most {cell_section.MOST_FIBRES}; make void_radius larger"
+        if voids > types.MOST_FIBRES:
+            bound = f"expected at most {types.MOST_FIBRES}; make void_radius larger"
             raise MeshError(f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {voids:.2g} voids; {bound}")
         void_radii = np.full(voids, sqrt((cell.voids or 0.0) / (pi * voids)))
         radii, coating = np.append(radii, void_radii), np.append(coating, np.zeros(voids))

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.phase_names import COATING, MATRIX, VOID
-from feti_homog.microstructure.shapes import Discs, Outlines, convex_sums, directions
+from feti_homog.microstructure.shapes import Conics, Discs, Outlines, directions
 from feti_homog.typing import Bool, Float, Int
 
 # Decimals of lengths relative to the cell width in comparisons.
@@ -195,13 +195,16 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     Meshes of other cells need no node at a corner.
     """
     result = np.zeros(len(corners), bool)
-    if isinstance(arrangement.outlines, convex_sums.ConvexSums):
-        voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
-        away = _away(voids, corners, arrangement.size)
-        corner, void = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
-        normal = directions(np.linspace(0.0, 2 * np.pi, convex_sums.POINTS, endpoint=False))
-        reach = voids[void].support(np.broadcast_to(normal, (len(void), *normal.shape)))
-        result[corner[(-away[corner, void] @ normal.T < reach).all(axis=1)]] = True
+    if isinstance(arrangement.outlines, Conics):
+        return result
+    from feti_homog.microstructure.shapes import convex_sums  # few cells have polygons
+
+    voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
+    away = _away(voids, corners, arrangement.size)
+    corner, void = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
+    normal = directions(np.linspace(0.0, 2 * np.pi, convex_sums.POINTS, endpoint=False))
+    reach = voids[void].support(np.broadcast_to(normal, (len(void), *normal.shape)))
+    result[corner[(-away[corner, void] @ normal.T < reach).all(axis=1)]] = True
     return result
 
 

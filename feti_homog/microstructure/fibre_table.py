@@ -16,7 +16,7 @@ from feti_homog.microstructure import table_columns
 from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
 from feti_homog.microstructure.shapes.outlines import Columns, Outlines
 from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
-from feti_homog.schema import limits, types, wording
+from feti_homog.schema import types, wording
 from feti_homog.typing import Bool, Float, Int
 
 COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBERS)[3:])
@@ -127,8 +127,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
-    if len(lines) > 2 * limits.FIBRES:
-        raise CaseError(f"{name}: {len(lines)} lines; expected at most {2 * limits.FIBRES}")
+    if len(lines) > 2 * types.MOST_FIBRES:
+        raise CaseError(f"{name}: {len(lines)} lines; expected at most {2 * types.MOST_FIBRES}")
     delimiter = table_columns.delimiter_of(lines[0][1])
     head = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     words = head[0] if columns is None else list(columns)

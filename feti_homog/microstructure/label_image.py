@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.errors import MOST_FAULTS, CaseError, FetiHomogError
 from feti_homog.microstructure import phase_names
-from feti_homog.schema import limits, wording
+from feti_homog.schema import types, wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Array, Int32
 
@@ -56,7 +56,7 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     Raises:
         CaseError: the file is damaged or too large, or has not exactly one image.
     """
-    memory = 128 * limits.PIXELS
+    memory = 128 * types.MOST_PIXELS
     image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
         shape = "x".join(map(str, image.shape))
@@ -66,8 +66,8 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
 
 
 def _check_size(path: Path, rows: int, columns: int) -> None:
-    if min(rows, columns) < 2 or rows * columns > limits.PIXELS:
-        expected = f"expected two rows and columns or more, and at most {limits.PIXELS} pixels"
+    if min(rows, columns) < 2 or rows * columns > types.MOST_PIXELS:
+        expected = f"expected two rows and columns or more, and at most {types.MOST_PIXELS} pixels"
         raise CaseError(f"{path.name}: {columns} x {rows} pixels; {expected}")
 
 

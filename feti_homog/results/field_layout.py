@@ -1,9 +1,12 @@
-"""Define the layout of result.h5: the parts that ranks write, and their paths in the file.
+"""Define the layout of result.h5: the parts that ranks write, their paths in the file, and views for viewers.
 
 Lengths have the unit of the cell, stresses the unit of the moduli.  The file has n nodes, m elements, k interface nodes
-and f fibres, distributed over the ranks.  Nodes are torn: each body in each subdomain has its own nodes.
+and f fibres, distributed over the ranks.  Nodes are torn: each body in each subdomain has its own nodes.  Views are
+vectors with three components, tensors and single columns.  They are virtual and nearly free: HDF5 fills them from other
+datasets when a viewer reads them.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +15,7 @@ from feti_homog.system.runtime import described, records
 from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
+GROUP_OF_STATES = "state/K"
 
 
 @dataclass(frozen=True)
@@ -179,3 +183,85 @@ class SpatialStatePart(StatePart):
     axial_stress: Float = described(f"element means, {', '.join(voigt.AXIAL_STRESSES)}", records.STRESS, "(m, 2)")
     axial_traction: Float = described("sigma n along x3", records.STRESS, "(k,)")
     axial_jump: Float = described("slip along x3: matrix displacement minus fibre displacement", records.LENGTH, "(k,)")
+
+
+@dataclass(frozen=True)
+class View:
+    """A virtual dataset /`kind`/GROUP/`name` over datasets of /GROUP.
+
+    Attributes:
+        components: column count; 0 for a dataset with one dimension.
+        source: dataset that provides type and unit.
+        columns: for each nonzero column, the source dataset and source column; None for the whole dataset.
+        meaning: description in words.
+    """
+
+    kind: str
+    name: str
+    components: int
+    source: str
+    columns: Mapping[int, tuple[str, int | None]]
+    meaning: str
+
+    def path(self, group: str) -> str:
+        """Return the path of the view in the file."""
+        return f"{self.kind}/{group}/{self.name}"
+
+
+def _vector(name: str, third: str = "") -> View:
+    columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, None)} if third else {})
+    sentence = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
+    return View("vector", name, 3, name, columns, sentence)
+
+
+def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
+    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with some `entries`."""
+    places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
+    columns = {place: entries[entry] for place, entry in places if entry in entries}
+    sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
+    return View("tensor", name, 9, source, columns, sentence)
+
+
+def _column(name: str, source: str, column: int) -> View:
+    return View("column", name, 0, source, {0: (source, column)}, f"column {column} of `{source}`")
+
+
+STRESS_TENSOR: dict[str, tuple[str, int | None]] = {
+    **{name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
+    "33": ("stress_33", None),
+}
+COLUMNS = (
+    *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
+    *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
+)
+AXIAL = "axial_displacement"  # dataset that only states of generalized plane strain have
+
+# The views of each group; /state/K stands for every state.
+VIEWS: dict[str, tuple[View, ...]] = {
+    "interface": (_vector("normal"),),
+    GROUP_OF_STATES: (_vector("displacement"), _tensor("stress", "stress", STRESS_TENSOR), *COLUMNS),
+}
+
+# The views of a state in generalized plane strain.
+SPATIAL_VIEWS: tuple[View, ...] = (
+    _vector("displacement", AXIAL),
+    _tensor(
+        "stress", "stress", STRESS_TENSOR | {s[1:]: ("axial_stress", k) for k, s in enumerate(voigt.AXIAL_STRESSES)}
+    ),
+    *COLUMNS,
+    *(_column(name, "axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)),
+)
+
+
+def views_of(file: Any) -> list[tuple[str, View]]:
+    """Return group and view for each view with existing, non-empty tables in an open file."""
+    groups = {"interface": VIEWS["interface"]}
+    for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
+        groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
+    return [
+        (group, view)
+        for group, views in groups.items()
+        for view in views
+        if {view.source, *(name for name, _ in view.columns.values())} <= file[group].keys()
+        and len(file[group][view.source]) > 0
+    ]

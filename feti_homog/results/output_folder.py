@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from feti_homog import __version__
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file, result_json
@@ -20,7 +21,6 @@ from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, input_files
 from feti_homog.typing import Intracomm
-from feti_homog.version import __version__
 
 LOCK = "result.lock"
 LOG = "events.log"  # one line for each event, for users to follow a running path

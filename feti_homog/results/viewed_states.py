@@ -19,7 +19,7 @@ from feti_homog.errors import CaseError
 from feti_homog.fem import AXIAL, PLANE, assembly
 from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file, field_guard, xdmf
-from feti_homog.results.field_views import AXIAL as AXIAL_DISPLACEMENT
+from feti_homog.results.field_layout import AXIAL as AXIAL_DISPLACEMENT
 from feti_homog.typing import Array, Float
 from feti_homog.verify import constitutive_law
 

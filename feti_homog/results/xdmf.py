@@ -16,8 +16,7 @@ import numpy as np
 
 from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file
-from feti_homog.results.field_layout import StatePart, tables
-from feti_homog.results.field_views import AXIAL
+from feti_homog.results.field_layout import AXIAL, StatePart, tables
 from feti_homog.typing import Float
 
 CELL, INTERFACE = "result.xdmf", "interface.xdmf"

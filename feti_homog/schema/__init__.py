@@ -1,8 +1,8 @@
 """Tables of keys: value types, a reader that collects all faults of a table, and the wording of faults.
 
-Imports nothing.  Main entries: `limits`; `types` (types with a description and a test); `keys.key`, `keys.TableReader`.
+Imports nothing.  Main entries: `types` (types with a description and a test, limits); `keys.key`, `keys.TableReader`.
 """
 
 from feti_homog.schema.keys import TableReader, key
 
-__all__ = ["TableReader", "key", "keys", "limits", "types", "wording"]
+__all__ = ["TableReader", "key", "keys", "types", "wording"]

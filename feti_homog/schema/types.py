@@ -1,4 +1,7 @@
-"""The types of values in a case file: description, test and stored form."""
+"""The types of values in a case file: description, test and stored form; limits of files and lists.
+
+Limits of entries let the program check each case file or table in less than ten seconds.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,12 @@ from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Limits for magnitudes of numbers other than 0, so that products of a few numbers neither overflow nor underflow."""
+MOST_BYTES = 1 << 22  # of a case file: tomllib reads 1 to 3 MB a second
+MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
+MOST_FIBRES = 100_000  # in a cell, with as many voids: twice as many rows of a table
+MOST_ROWS = 10_000  # arcs, waypoints, points of a curve, cases of a sweep: 50 to 500 us each
+MOST_SECTIONS = 1000  # [[interface]], for pairs among 45 phases; [[test]]; uncertain numbers
+MOST_PIXELS = 100 * MOST_FIBRES  # of an image: two triangles each
 Test = Callable[[Any], bool]
 INF = "inf"
 """The text for an infinite number in resolved cases, because JSON has no such number."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feti_homog.case import sections, toml_files
-from feti_homog.schema import TableReader, keys, limits, types, wording
+from feti_homog.schema import TableReader, keys, types, wording
 
 DIGITS = 12  # of a computed value, so that rounding errors do not change the identity of a case
 Assignment = dict[toml_files.TomlPath, Any]
@@ -76,8 +76,8 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
         lengths = ", ".join(f"{len(rows)} of {name}" for name, rows in lists)
         lines.append(f'[{sections.SWEEP}] mode = "zip": expected as many values of each key; there are {lengths}')
     cases = (prod(counts) if settings.mode == "grid" else max(counts, default=1)) * (settings.realisations or 1)
-    if cases > limits.ROWS:
-        lines.append(f"[{sections.SWEEP}]: {cases} cases; expected at most {limits.ROWS}")
+    if cases > types.MOST_ROWS:
+        lines.append(f"[{sections.SWEEP}]: {cases} cases; expected at most {types.MOST_ROWS}")
     if not axes and not lines and settings.realisations is None:
         lines.append(
             f"[{sections.SWEEP}]: nothing varies; expected keys with {sections.AXIS_EXPECTED}, or realisations"
@@ -136,11 +136,11 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
         width = high - low
         if not types.is_number(step) or not 0 < step <= width or scale == "log":
             return f"expected a step above 0 and at most to - from, linear{types.magnitudes_in_words(step)}"
-        too_many = f"about {width / step:.6g} values; expected a step that makes at most {limits.ROWS}"
-        return too_many if width / step >= limits.ROWS else ""
+        too_many = f"about {width / step:.6g} values; expected a step that makes at most {types.MOST_ROWS}"
+        return too_many if width / step >= types.MOST_ROWS else ""
     if count is not None:
-        is_valid = isinstance(count, int) and 2 <= count <= limits.ROWS
-        return "" if is_valid else f"expected a count from 2 to {limits.ROWS}"
+        is_valid = isinstance(count, int) and 2 <= count <= types.MOST_ROWS
+        return "" if is_valid else f"expected a count from 2 to {types.MOST_ROWS}"
     return "" if is_sampled else f"expected {sections.AXIS_EXPECTED}"
 
 

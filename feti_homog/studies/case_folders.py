@@ -17,13 +17,13 @@ from typing import Any
 
 import tomli_w
 
+from feti_homog import __version__
 from feti_homog.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, checkpoints, output_folder, result_json
 from feti_homog.schema import types
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import file_locks, input_files
-from feti_homog.version import __version__
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",

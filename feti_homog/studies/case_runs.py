@@ -16,7 +16,7 @@ from feti_homog.studies import case_folders
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, case_names, expand
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
-from feti_homog.system.runtime import file_locks, progress_bar, standard_streams
+from feti_homog.system.runtime import file_locks, standard_streams
 from feti_homog.typing import Intracomm
 
 
@@ -157,7 +157,7 @@ class CaseRunner:
         Returns the error that stopped the group, or None.
         """
         timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
-        progress, label = progress_bar.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
+        progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
         try:
             with stepped_progress.shown(progress, label) as advance:
                 while timeouts:
@@ -196,7 +196,7 @@ class CaseRunner:
             if outcome is Outcome.COMPUTED:
                 start, status = time.perf_counter(), str(case_folders.Status.DONE)
                 try:
-                    progress = progress_bar.Progress(self.comm, True, within)
+                    progress = standard_streams.Progress(self.comm, True, within)
                     runner.run(case, folder, progress, resume=case.section.is_followed)
                 except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case alone
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
@@ -237,7 +237,7 @@ class CaseRunner:
         return Outcome.COMPUTED, ""
 
     def _print(self, line: str) -> None:
-        progress_bar.Progress(self.comm, self.quiet).say(line)  # past the bar
+        standard_streams.Progress(self.comm, self.quiet).say(line)  # past the bar
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:

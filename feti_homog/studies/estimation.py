@@ -1,18 +1,22 @@
-"""Estimate unknowns by weighted least squares, with covariances and undetermined directions.
+"""Estimate unknowns by weighted least squares, with covariances and undetermined directions; content of fit.json.
 
 Data y have independent errors with standard deviations s, so that residuals are r_i = (f_i(x) - y_i) / s_i.  With
 J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covariance is (J^T J)^-1.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm
 
+from feti_homog.case import sections
+from feti_homog.studies.predictions import Datum
 from feti_homog.typing import Array, Float
 
+HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
 LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 # The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
@@ -170,3 +174,55 @@ def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
 def _sizes(x: Float) -> Float:
     """Return the magnitudes (n,) of unknowns; 1 for zeros."""
     return np.where(x == 0.0, 1.0, np.abs(x))
+
+
+def fit_document(
+    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
+) -> dict[str, Any]:
+    """Return the content of fit.json without its name; numbers that are not finite are None."""
+    faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
+    misfits = estimates.misfits
+    if misfits and estimates.undetermined:
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
+        faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
+    elif misfits:
+        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
+    faults += [
+        f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
+        f"width {unknown.upper - unknown.lower:.3g} of its bounds"
+        for (name, unknown), std in zip(unknowns.items(), estimates.std, strict=True)
+        if np.isfinite(std) and std > unknown.upper - unknown.lower
+    ]
+    return {
+        "status": "not converged" if faults else "done",
+        "faults": faults,
+        "confidence": CONFIDENCE,
+        "evaluations": estimates.evaluations,
+        "unknowns": {
+            name: {
+                "estimate": float(estimates.x[k]),
+                "std": _or_none(estimates.std[k]),
+                "interval": [_or_none(estimates.x[k] + sign * estimates.half_width[k]) for sign in (-1, 1)],
+                "at_bound": {-1: "lower", 0: None, 1: "upper"}[int(estimates.at_bound[k])],
+                "start": unknown.start, "lower": unknown.lower, "upper": unknown.upper,
+                "shares": [float(share) for share in estimates.shares[k]],
+            }
+            for k, (name, unknown) in enumerate(unknowns.items())
+        },
+        "correlation": [[_or_none(value) for value in row] for row in estimates.correlation],
+        "singular_values": estimates.singular_values.tolist(),
+        "directions": estimates.directions.tolist(),
+        "sum_of_squares": _or_none(float(estimates.residuals @ estimates.residuals)),
+        "chance": estimates.chance,
+        "measured": [
+            {"test": datum.test + 1, "name": datum.name, "strain": datum.strain,
+             "strain_name": datum.strain_name or None, "value": datum.value, "std": datum.std,
+             "computed": float(f), "residual": float(r)}
+            for datum, f, r in zip(data, estimates.computed, estimates.residuals, strict=True)
+        ],
+    }  # fmt: skip
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -19,7 +19,7 @@ from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
 from feti_homog.results import atomic, result_json
-from feti_homog.studies import estimation, fit_result
+from feti_homog.studies import estimation
 from feti_homog.studies.axes import Assignment, Axis, rounded, sampled_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
@@ -115,9 +115,9 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
-            rows = [[datum[name] for name in fit_result.HEAD] for datum in document["measured"]]
-            atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([fit_result.HEAD, *rows]))
+            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates)}
+            rows = [[datum[name] for name in estimation.HEAD] for datum in document["measured"]]
+            atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([estimation.HEAD, *rows]))
             results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
             pictures.draw_fit(evaluator.directory / "fit.png", document, results)
             return document

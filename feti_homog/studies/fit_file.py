@@ -9,7 +9,7 @@ from feti_homog.case import sections, toml_files
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
 from feti_homog.microstructure import table_columns
-from feti_homog.schema import TableReader, keys, limits, types, wording
+from feti_homog.schema import TableReader, keys, types, wording
 from feti_homog.studies.axes import Assignment
 from feti_homog.studies.fit import Fit
 from feti_homog.studies.predictions import Datum, data_faults
@@ -92,8 +92,12 @@ class FitReader:
             )
             return [], []
         rows = [{sections.MEASURED: measured}] if tests is None else tests
-        if not isinstance(rows, list) or len(rows) > limits.SECTIONS or not all(isinstance(row, dict) for row in rows):
-            words = f"expected sections [[{sections.TEST}]], at most {limits.SECTIONS}"
+        if (
+            not isinstance(rows, list)
+            or len(rows) > types.MOST_SECTIONS
+            or not all(isinstance(row, dict) for row in rows)
+        ):
+            words = f"expected sections [[{sections.TEST}]], at most {types.MOST_SECTIONS}"
             self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: {words}")
             return [], []
         assignments, data = list[Assignment](), list[Datum]()
@@ -163,8 +167,8 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
     strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
     if (len(strains), len(stresses)) != (1, 1):
         raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
-    if not 1 < len(lines) <= limits.ROWS + 1:
-        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {limits.ROWS}")
+    if not 1 < len(lines) <= types.MOST_ROWS + 1:
+        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {types.MOST_ROWS}")
     rows = list[tuple[float, float]]()
     for number, line in lines[1:]:
         cells, place = table_columns.cells_of(line, delimiter), f"{path}, line {number}"

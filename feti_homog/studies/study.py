@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from feti_homog import __version__
 from feti_homog.case import toml_files
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic, output_folder, result_json
@@ -22,7 +23,6 @@ from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import input_files, standard_streams
 from feti_homog.typing import Intracomm
-from feti_homog.version import __version__
 
 SILENT = {"fields": False, "pictures": False, "report": False}
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections, toml_files
-from feti_homog.schema import limits, types, wording
+from feti_homog.schema import types, wording
 from feti_homog.typing import Float
 
 STIFFNESS = "stiffness"
@@ -61,8 +61,10 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    if len(given) > limits.SECTIONS:
-        faults.append(f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {limits.SECTIONS}")
+    if len(given) > types.MOST_SECTIONS:
+        faults.append(
+            f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {types.MOST_SECTIONS}"
+        )
         return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():

@@ -8,16 +8,19 @@ from typing import Any
 
 from feti_homog.analysis.result import Result
 from feti_homog.results.field_layout import (
+    GROUP_OF_STATES,
     PROGRAM,
+    SPATIAL_VIEWS,
+    VIEWS,
     FibrePart,
     Header,
     InterfacePart,
     MeshPart,
     SpatialStatePart,
     StatePart,
+    View,
     rows_of,
 )  # fmt: skip
-from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
 from feti_homog.system.runtime.records import Description, descriptions, without_none
 
 WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}

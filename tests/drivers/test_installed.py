@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.jobs import LAUNCHER_VARIABLES, PATIENCE, ROOT, RUN_VARIABLES
 
-from feti_homog.system.runtime.environment import SETTINGS
+from feti_homog.system.runtime.process import SETTINGS
 
 SOURCES = ("feti_homog", "setup.py", "pyproject.toml", "README.md", "LICENSE")
 

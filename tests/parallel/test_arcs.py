@@ -15,7 +15,7 @@ from feti_homog.case import cases
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.mesh.arrange import arrange
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.parallel
 

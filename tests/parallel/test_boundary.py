@@ -11,14 +11,13 @@ from support.cases import make_case, relative_error, solve
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
-from feti_homog.feti.factory import construct
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
-from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS
+from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS, construct
 from feti_homog.feti.thresholds import Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.parallel
 

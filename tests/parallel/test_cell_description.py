@@ -10,7 +10,7 @@ from feti_homog.analysis.description import describe
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -16,7 +16,7 @@ from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.parallel
 

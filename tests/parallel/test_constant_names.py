@@ -12,7 +12,7 @@ from feti_homog import Case, run
 from feti_homog.materials.engineering_constants import ABOUT_FIBRES, OF_THE_CELL, constants
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
 from feti_homog.report.cards.export import csv_table
-from feti_homog.report.text import constant_tables, stiffness_tables
+from feti_homog.report.text import constant_tables
 from feti_homog.report.text.summary import summary
 from feti_homog.studies.outputs import outputs
 from feti_homog.studies.predictions import responses
@@ -48,8 +48,8 @@ def test_every_constant_has_one_name(result):
     own = dict(zip(found.sensitivities.constants, map(float, found.sensitivities.constant_values), strict=True))
     assert {*responses(found.document)} == {*constants(np.eye(6), np.zeros(6))} == {*own}
     sources = {"sensitivities": own, "sweep": outputs(document)}
-    sources["axes of the cell"] = dict(row[:2] for row in stiffness_tables.constants(document)[0].rows)
-    about = stiffness_tables.constants(document)[1]
+    sources["axes of the cell"] = dict(row[:2] for row in constant_tables.cell_constants(document)[0].rows)
+    about = constant_tables.cell_constants(document)[1]
     sources["about the fibres"] = dict(
         zip((column.name for column in about.columns[1:]), map(float, about.rows[0][1:]), strict=True)
     )

@@ -11,7 +11,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.materials import voigt
-from feti_homog.report.text import phase_tables
+from feti_homog.report.text import summary
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -41,7 +41,7 @@ def phases_of(*of_run, **more):
 
 def factors(result):
     """Return the printed load factor of each phase."""
-    *_, table = phase_tables.phase_tables(result.document)
+    *_, table = summary.phase_tables(result.document)
     return {row[0]: row[-1] for row in table.rows if table.columns[-1].name == "load factor"}
 
 

@@ -17,8 +17,8 @@ from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.petsc.option_table import OPTIONS, only_prints
-from feti_homog.system.runtime.progress_bar import Progress
 from feti_homog.system.runtime.records import plain
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.parallel
 RANDOM = {

@@ -14,7 +14,7 @@ from feti_homog.homogenization import unit_cell
 from feti_homog.materials import laws
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

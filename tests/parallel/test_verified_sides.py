@@ -27,7 +27,7 @@ from feti_homog.case.cases import Case
 from feti_homog.errors import MeshError, NotCarriedError
 from feti_homog.homogenization import unit_cell
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]

@@ -14,7 +14,7 @@ from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 

@@ -16,7 +16,7 @@ from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES

@@ -4,7 +4,7 @@ from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
 from feti_homog.mesh.outline.bare_outline import BareOutline
-from feti_homog.mesh.sizes.graded_size import MeshSizes
+from feti_homog.mesh.outline.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import fill
 from feti_homog.mesh.tiles.tiling import DEFAULT_TILES
 

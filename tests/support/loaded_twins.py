@@ -15,7 +15,7 @@ from feti_homog.homogenization import unit_cell
 from feti_homog.mesh.arrange import arrange
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 from support.ranks import PIECES
 
 GENERALIZED = "generalized"

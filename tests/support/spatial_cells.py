@@ -11,7 +11,7 @@ from feti_homog.case.cases import Case
 from feti_homog.homogenization import unit_cell
 from feti_homog.mesh.arrange import arrange
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0}
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0}

@@ -15,7 +15,7 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, OPEN, BondState
 from feti_homog.mesh.arrange import arrange
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 from support.cases import make_case
 
 

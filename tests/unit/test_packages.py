@@ -9,7 +9,7 @@ from unit.test_architecture import MODULES, PACKAGE, imported_names, name_of, no
 PACKAGES = {name_of(path).removesuffix("__init__").rstrip("."): path for path in PACKAGE.rglob("__init__.py")}
 DESCRIBED = sorted(set(PACKAGES) - {""})
 LARGEST_FACE = 12
-EVERYWHERE = {"errors", "typing", "version"}  # modules that every package may import
+EVERYWHERE = {"errors", "typing", "__version__"}  # modules that every package may import
 
 
 def described(package: str) -> str:

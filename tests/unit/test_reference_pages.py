@@ -16,11 +16,11 @@ from mpi4py import MPI
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
 from feti_homog.case.cases import Case
-from feti_homog.materials.strength import CRITERIA
+from feti_homog.materials.material_forms import CRITERIA
 from feti_homog.results.result_json import columns
 from feti_homog.studies import case_runs, collect, sweep_cases
 from feti_homog.studies.outputs import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS, outputs
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 pytestmark = pytest.mark.slow
 

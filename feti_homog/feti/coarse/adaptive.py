@@ -25,7 +25,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, ROUNDING_MARGIN, ZERO_TOLERANCE, Thresholds
 from feti_homog.system.parallel import distributed_arrays
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 from feti_homog.typing import Float, Int
 
 
@@ -65,7 +65,7 @@ class AdaptiveCoarseSpace:
         self._neighbours = Neighbours(comm, jump_operator, operators.subdomains)
         blocks = geneo.subdomain_blocks(operators, scaling, self._neighbours.rows)
         V = geneo.kernels_and_soft_modes(blocks, self._neighbours, threshold, thresholds)
-        process_memory.trim()
+        process.trim_memory()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
         self._modes = geneo.AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
@@ -78,7 +78,7 @@ class AdaptiveCoarseSpace:
         self._mask = np.ones(len(jump_operator.rows))
         self._solve_event = PETSc.Log.Event("FETICoarseSolve")
         self._update(range(len(blocks)), [block.BW for block in blocks])
-        process_memory.trim()
+        process.trim_memory()
         self.factorizations = 0
         self._free_energy: Float | None = None
         self.factor(self.part())

@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
 from feti_homog.mesh import Torus, periodic_topology
-from feti_homog.system.parallel import dividing
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Int
 
 
@@ -136,7 +136,7 @@ def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     METIS puts neighbours (left, right), one pair for every shared edge, on the same rank, if the largest load is at
     most MAX_IMBALANCE times the largest of balanced loads.  With more ranks than subdomains, some ranks stay empty.
     """
-    by_load = dividing.balanced(load, n_ranks)
+    by_load = distributed_arrays.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return by_load
     by_place = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)

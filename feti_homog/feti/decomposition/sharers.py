@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.mesh import SubmeshesOfRank, submeshes
-from feti_homog.system.parallel import distributed_arrays, dividing
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Int
 
 
@@ -51,7 +51,7 @@ class Sharers:
     def chosen(self, which: Int) -> Sharers:
         """Return the entities with the numbers `which` (k,), in this order."""
         copies = self.copies[which]
-        sharer = self.sharer[dividing.ranges(self.pointer[which], copies)]
+        sharer = self.sharer[distributed_arrays.ranges(self.pointer[which], copies)]
         return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
 
 
@@ -85,7 +85,7 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     entity_and_rank = np.unique(entity * comm.size + table.rank[subdomain])
     entity, to = entity_and_rank // comm.size, entity_and_rank % comm.size
     code, count = distributed_arrays.exchange(comm, to, code[entity], copies[entity])
-    whose = dividing.ranges(first[entity], copies[entity])
+    whose = distributed_arrays.ranges(first[entity], copies[entity])
     (sharer,) = distributed_arrays.exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
     sharers = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
     return sharers.chosen(np.lexsort((sharers.key, sharers.is_edge)))

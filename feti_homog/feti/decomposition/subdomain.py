@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
-from feti_homog.fem import PLANE, Problem, assembly, bubble
+from feti_homog.fem import PLANE, Problem, assembly, shape_functions
 from feti_homog.feti.thresholds import LEAST_ORDERED_DOFS, SCALED_LAME, ZERO_TOLERANCE
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, mesh_fibres, refinement
 from feti_homog.typing import Float, Int
@@ -198,7 +198,7 @@ class Subdomain:
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
-        first, shear = bubble.lame(self.L)
+        first, shear = shape_functions.lame(self.L)
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:

@@ -21,7 +21,7 @@ from feti_homog.feti.exact.reference_changes import ReferenceChanges
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.system.parallel import distributed_arrays
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -112,7 +112,7 @@ class ExactInverse(Preconditioner):
         """Factor the reference cell with the bonds `active`, which must stop all bodies.  Collective."""
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
-            process_memory.trim()
+            process.trim_memory()
         self.reference = ReferenceCell(self._operators, self._one_sided, active)
         self.factorizations += 1
         nothing = np.zeros((self._rows, 0))

@@ -1,6 +1,6 @@
 """Boundary operators S and S+ of subdomains, the dual operator F, and its preconditioners.
 
-Imports `feti`, `feti.decomposition`, `feti.linalg` and `system`.  Main entries: `choice.choose`,
+Imports `feti`, `feti.decomposition`, `feti.linalg` and `system`.  Main entries: `interface_operators.choose`,
 `interface_operators.InterfaceOperators`, `interface_operators.DualOperator` and `preconditioners.Preconditioner`.
 """
 

@@ -1,10 +1,12 @@
-"""The boundary operators of the local subdomains, and the dual operator, Eq. (36)."""
+"""The boundary operators of the local subdomains, dense or sparse, and the dual operator, Eq. (36)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
@@ -14,13 +16,70 @@ from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
 from feti_homog.feti.operators import one_subdomain
-from feti_homog.feti.operators.choice import SubdomainSize, choose
-from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, DENSE_INVERSE_COST, Thresholds
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int
 
+if TYPE_CHECKING:
+    from feti_homog.feti.operators.with_springs import BoundaryOperator
+
 InterfaceOperator = one_subdomain.ExplicitInterfaceOperator | one_subdomain.ImplicitInterfaceOperator
+
+KINDS = ("auto", "implicit", "explicit")
+
+
+@dataclass(frozen=True)
+class SubdomainSize:
+    """The arguments of `choose` for one subdomain: sizes and properties.
+
+    Attributes:
+        dofs: number of degrees of freedom.
+        boundary_dofs: number n of degrees of freedom on nodes with constraints.
+        is_whole_body: whether every shared node belongs to a single other body.
+        has_springs: whether the inner body of springs: its stiffness with springs is a dense matrix.
+    """
+
+    dofs: int
+    boundary_dofs: int
+    is_whole_body: bool
+    has_springs: bool = False
+
+
+def choose(
+    sizes: Sequence[SubdomainSize],
+    kind: str,
+    applications: int,
+    soft_modes: bool,
+    can_condense: bool,
+    thresholds: Thresholds,
+) -> tuple[list[bool], list[bool]]:
+    """Choose the boundary operators of every subdomain.
+
+    Returns `explicit`, whether they are dense matrices, not sparse factorizations, and `facewise`, whether soft modes
+    are computed face by face, by subdomain.
+
+    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs` and a reason holds: their inverse takes no
+    longer than all products by sparse factors, DENSE_INVERSE_COST n^3 <= dofs x applications; or springs; or soft modes
+    of the whole boundary.  Whole bodies without springs and n > `whole_boundary_dofs` get soft modes face by face.
+
+    Args:
+        sizes: sizes of the subdomains; the result has the same order.
+        kind: the option `-feti_dual_operator`, one of KINDS; a subdomain with n = 0 never gets dense matrices.
+        applications: expected number of products with the operators.
+        soft_modes: whether soft modes will be computed.
+        can_condense: whether PETSc has MUMPS, which condenses subdomains; without it the default is sparse factors.
+    """
+    chosen_explicit, chosen_facewise = list[bool](), list[bool]()
+    for size in sizes:
+        n = size.boundary_dofs
+        facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs and not size.has_springs
+        pays = DENSE_INVERSE_COST * n**3 <= size.dofs * applications
+        is_useful = pays or size.has_springs or (soft_modes and not facewise)
+        possible = n <= thresholds.dense_boundary_dofs and can_condense
+        explicit = kind == "explicit" or (kind == "auto" and is_useful and possible)
+        chosen_explicit.append(explicit and n > 0)
+        chosen_facewise.append(facewise)
+    return chosen_explicit, chosen_facewise
 
 
 class DualOperator:
@@ -93,8 +152,7 @@ class InterfaceOperators:
         nodes = (s.problem.nodes(np.flatnonzero(mask)) for s, mask in zip(subdomains, constrained, strict=True))
         self.dofs = [s.problem.dofs(np.unique(nodes_s)) for s, nodes_s in zip(subdomains, nodes, strict=True)]
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
-        numbers = (offset + dofs for offset, dofs in zip(first[:-1], self.dofs, strict=True))
-        self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
+        self.local_dofs = np.concatenate([np.zeros(0, np.int64), *map(np.add, first, self.dofs)])
         self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
         first_row, last_row = jump_operator.owned
@@ -104,6 +162,8 @@ class InterfaceOperators:
         self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
         roots: list[csr_matrix | None] = [None] * len(subdomains)
         if compliance is not None:
+            from feti_homog.feti.operators.with_springs import WithSprings, compliance_root  # few cells have springs
+
             parts = ((self.B[:, span], compliance, jump_operator.copies, self.of_inner[span]) for span in self.slices)
             roots = [compliance_root(*part) for part in parts]
         pieces = jump_operator.shared.pieces
@@ -111,15 +171,14 @@ class InterfaceOperators:
             SubdomainSize(s.n_dofs, len(dofs), s.submesh.index not in pieces, not s.is_outer and root is not None)
             for s, dofs, root in zip(subdomains, self.dofs, roots, strict=True)
         ]
-        has_mumps = PETSc.Sys.hasExternalPackage("mumps")
-        chosen = choose(sizes, kind, applications, soft_modes, has_mumps, thresholds)
-        self.facewise = [choice.facewise for choice in chosen]
+        how = kind, applications, soft_modes, PETSc.Sys.hasExternalPackage("mumps"), thresholds
+        explicit, self.facewise = choose(sizes, *how)
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
         self.interiors: dict[int, one_subdomain.Interior] = {}
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
-        for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
-            operator, diagonal = _factor(subdomain, dofs, choice.explicit, keep_factors)
+        for subdomain, dofs, is_explicit, root in zip(subdomains, self.dofs, explicit, roots, strict=True):
+            operator, diagonal = _factor(subdomain, dofs, is_explicit, keep_factors)
             self.operators.append(operator)
             self.with_springs.append(operator if root is None else WithSprings(operator, root, subdomain.R[dofs]))
             bodies.append(diagonal)

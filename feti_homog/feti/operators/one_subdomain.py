@@ -17,7 +17,6 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, full_from_lower, invert_upper, schur_complement
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.typing import Float, Int
 
@@ -42,21 +41,23 @@ class ExplicitInterfaceOperator:
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
         """
+        from feti_homog.feti.linalg import dense_matrices  # sparse operators do not need it
+
         fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n, self._subdomain = len(dofs), subdomain
         self.factor, q, C, order = None, subdomain.Q[dofs], subdomain.volume_stiffness, subdomain.elimination_order()
         if subdomain.loads_inside:
-            condensed = condensed_with_loads(K, dofs, subdomain.Q, order, keep_factor)
+            condensed = dense_matrices.condensed_with_loads(K, dofs, subdomain.Q, order, keep_factor)
             both, q, C, self.factor = condensed.S, condensed.q, C + condensed.C, condensed.factor
         else:
-            both = schur_complement(K, dofs, order)
+            both = dense_matrices.schur_complement(K, dofs, order)
         self.condensed = CondensedLoads(q, C, C)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S goes above the diagonal.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
         try:
-            invert_upper(both)
+            dense_matrices.invert_upper(both)
         except np.linalg.LinAlgError as error:
             raise np.linalg.LinAlgError(f"the regularised Schur complement of a subdomain: {error}") from error
         self._flexibility_diagonal = both.diagonal().copy()
@@ -113,7 +114,9 @@ class ExplicitInterfaceOperator:
     @property
     def S(self) -> Float:
         """Copy the Schur complement S (n, n)."""
-        S = full_from_lower(self._both)
+        from feti_homog.feti.linalg import dense_matrices
+
+        S = dense_matrices.full_from_lower(self._both)
         np.fill_diagonal(S, self._schur_diagonal)
         return S
 

@@ -1,6 +1,6 @@
 """Contact of debonded interfaces under one load: open and closed nodes.
 
-Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entries: `contact_problem.ContactProblem` and
+Imports `feti`, `interface`, `mesh` and `system`.  Main entries: `contact_problem.ContactProblem` and
 `coupled_interfaces.CoupledInterfaces`.
 """
 
@@ -10,5 +10,5 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 
 __all__ = [
     "BONDED", "CLOSED", "OPEN", "BondState", "Contact", "ContactProblem", "CoupledInterfaces", "Equilibrium",
-    "Status", "coupled_interfaces", "load_scales",
+    "Status", "coupled_interfaces",
 ]  # fmt: skip

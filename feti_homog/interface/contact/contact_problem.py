@@ -26,10 +26,8 @@ from mpi4py import MPI
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution, FetiSolver
 from feti_homog.feti.decomposition import constraint_layout
-from feti_homog.interface.contact import mixed_load
-from feti_homog.interface.contact.load_scales import NEGLIGIBLE, LoadScales
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, kkt_errors
-from feti_homog.interface.loads import Load
+from feti_homog.interface.loads import NEGLIGIBLE, Load, LoadScales, solve_load, unresisted
 from feti_homog.typing import Bool, Float, Int
 
 # Number of block pivots since the last progress; the literature usually allows ten without progress.
@@ -144,7 +142,7 @@ class ContactProblem:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.prepare(bonds)
-        return mixed_load.solve(self.scales, load, start)
+        return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
         """Compute the amplitudes and jumps that a state lacks, by F lambda.  Collective."""
@@ -206,7 +204,7 @@ class ContactProblem:
 
         self.prepare(state.bonds)
         stiffness = self.scales.mean_stiffness * float(self.size.prod())
-        return mixed_load.unresisted(self.solver, by_stress, stiffness)
+        return unresisted(self.solver, by_stress, stiffness)
 
     def _any(self, which: Bool) -> bool:
         """Return whether the mask `which` marks a node on any rank.  Collective."""

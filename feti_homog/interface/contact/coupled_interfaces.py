@@ -91,12 +91,6 @@ class CoupledInterfaces:
         stresses = [problem.stress(solution) for problem, solution in zip(self.problems, solutions, strict=True)]
         return Macroscopic(np.concatenate([solution.strain for solution in solutions]), np.concatenate(stresses))
 
-    def least_bonded_stress(self, strains: Float) -> Float:
-        """Return the stresses (m, n) under strains (m, n) for the least bonded stiffness.  Collective."""
-        parts = np.split(strains, [len(self.plane.solver.problem.loads)], axis=1)
-        pairs = zip(parts, self.problems, strict=False)
-        return np.hstack([strain @ problem.scales.least_bonded_stiffness for strain, problem in pairs])
-
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
     """Return r = s - C lam (owned rows,) in the tangential rows of damaged bonds.

@@ -19,7 +19,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti import DualSolution
 from feti_homog.feti.coarse import natural
 from feti_homog.feti.decomposition import constraint_layout
-from feti_homog.interface.contact.load_scales import NEGLIGIBLE
+from feti_homog.interface.loads import NEGLIGIBLE
 from feti_homog.mesh import periodic_topology
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Array, Bool, Float

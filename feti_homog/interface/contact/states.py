@@ -14,8 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact.load_scales import LoadScales
-from feti_homog.interface.loads import Load, Multipliers
+from feti_homog.interface.loads import Load, LoadScales, Multipliers
 from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]

@@ -6,14 +6,15 @@ A law is a dataclass of constants, numbers or arrays (k,) by node; `BondState.hi
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from feti_homog.case import bond_laws
+from feti_homog.case import bond_laws, interface_section
 from feti_homog.interface.contact import BondState, CoupledInterfaces
 from feti_homog.typing import Bool, Float, Int
 
@@ -21,19 +22,39 @@ from feti_homog.typing import Bool, Float, Int
 UTILISATION_TIE = 1e-6
 # Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
 MOST_STEPS = 60
+# Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
+# factor too, and the process zone keeps its length.
+POWERS = {"strength": 1, "toughness": 2}
+Sections = Sequence[interface_section.InterfaceSection]
 
 
-class KeyValues(Protocol):
-    """The values of [interface] keys at nodes; a section without the key takes an alternative key, or inf."""
+@dataclasses.dataclass(frozen=True)
+class SectionValues:
+    """The values of keys from the [interface] sections `pair` (k,) at nodes (k,).
 
-    def __call__(self, key: str, *alternatives: str) -> float | Float:
-        """Return the key value, for all nodes or by node (k,)."""
+    The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
+    """
 
-    def everywhere(self, key: str, *alternatives: str) -> Float:
-        """Return the values (s,) of a key in all sections, equal on every rank."""
+    bonds: Sections
+    pair: Int
+    factor: float | Float
+
+    def __call__(self, key: str, *more: str) -> float | Float:
+        """Return the value of the first key that is set, a number or (k,); inf if no key is set."""
+        sections = self.everywhere(key, *more)
+        values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
+        power = POWERS.get(key.rpartition("_")[2], 0)
+        return values * self.factor**power if power else values
+
+    def everywhere(self, key: str, *more: str) -> Float:
+        """Return the values (s,) in all sections, for the factor 1, equal on every rank."""
+        names = (key, *more)
+        values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
+        return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the value of a key that all sections share, as in the case."""
+        """Return the value of a key that all sections share."""
+        return getattr(self.bonds[0], key)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +87,7 @@ class BondLaw(ABC):
 
     @classmethod
     @abstractmethod
-    def of_keys(cls, value: KeyValues) -> Self:
+    def of_keys(cls, value: SectionValues) -> Self:
         """Make the law from the keys in [interface]."""
 
     def at(self, node: Int) -> Self:
@@ -196,3 +217,9 @@ def law_class(name: str) -> type[BondLaw]:
     module, cls = bond_laws.LAWS[name].implementation.split(".")
     law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
     return law
+
+
+def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
+    """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
+    name = bonds[0].criterion if bonds else bond_laws.DEFAULT
+    return law_class(name).of_keys(SectionValues(bonds, pair, factor))

@@ -20,7 +20,7 @@ import numpy as np
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.interface.contact import BONDED, BondState, ContactProblem, CoupledInterfaces
-from feti_homog.interface.laws.bond_law import UTILISATION_TIE, KeyValues, SpringLaw
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE, SectionValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class SpringEnergy(SpringLaw):
     has_tips: ClassVar[bool] = True
 
     @classmethod
-    def of_keys(cls, value: KeyValues) -> Self:
+    def of_keys(cls, value: SectionValues) -> Self:
         """Make the law from [interface] keys; the axial stiffness defaults to the tangential stiffness."""
         return cls(
             value("normal_stiffness"),

@@ -24,7 +24,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.interface.contact import BondState, CoupledInterfaces
-from feti_homog.interface.laws.bond_law import MOST_STEPS, KeyValues, SpringLaw
+from feti_homog.interface.laws.bond_law import MOST_STEPS, SectionValues, SpringLaw
 from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.typing import Bool, Float, Int
 
@@ -68,7 +68,7 @@ class CohesiveLaw(SpringLaw):
     is_convex: ClassVar[bool] = False
 
     @classmethod
-    def of_keys(cls, value: KeyValues) -> Self:
+    def of_keys(cls, value: SectionValues) -> Self:
         """Make the law and its damage levels from the keys in [interface]."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
         # The levels follow from all sections, so that all ranks agree.
@@ -77,7 +77,7 @@ class CohesiveLaw(SpringLaw):
         return replace(law, levels=levels, **branch)
 
     @classmethod
-    def branch(cls, value: KeyValues) -> dict[str, Any]:
+    def branch(cls, value: SectionValues) -> dict[str, Any]:
         """Return the dataclass fields that describe the softening branch."""
         return {}
 
@@ -264,7 +264,7 @@ class TableLaw(PiecewiseLinear):
     """A law with a table of traction over opening in mode I, stretched to the toughness of other modes."""
 
     @classmethod
-    def branch(cls, value: KeyValues) -> dict[str, Any]:
+    def branch(cls, value: SectionValues) -> dict[str, Any]:
         """Return the knots and heights of the table, which begins at the peak traction."""
         openings, tractions = np.array(value.common("openings")), np.array(value.common("tractions"))
         return {"knots": tuple(openings / openings[0] - 1.0), "heights": tuple(tractions / tractions[0])}

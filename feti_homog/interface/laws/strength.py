@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from feti_homog.interface.laws.bond_law import BondLaw, KeyValues
+from feti_homog.interface.laws.bond_law import BondLaw, SectionValues
 from feti_homog.typing import Float
 
 
@@ -25,7 +25,7 @@ class Strength(BondLaw):
     axial: float | Float = math.inf
 
     @classmethod
-    def of_keys(cls, value: KeyValues) -> Self:
+    def of_keys(cls, value: SectionValues) -> Self:
         """Make the law from [interface] keys; the axial strength defaults to the tangential strength."""
         return cls(
             value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")

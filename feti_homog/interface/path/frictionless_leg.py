@@ -145,8 +145,10 @@ class FrictionlessLeg(Leg):
             target, reached = max((start + self._bends_before) / 2, nearest), False
         before, after = self._mean, cell.macroscopic(end)
         ends = np.stack([self._response(before), self._response(after)])
-        least = cell.least_bonded_stress(np.stack([before.strain, after.strain]))
-        largest = max(np.abs(ends).max(), np.abs(least).max())
+        parts = np.split(np.stack([before.strain, after.strain]), [len(cell.plane.solver.problem.loads)], axis=1)
+        pairs = zip(parts, cell.problems, strict=False)
+        least = [np.abs(strain @ problem.scales.least_bonded_stiffness).max() for strain, problem in pairs]
+        largest = max(np.abs(ends).max(), *least)
         off_line = max(cell.plane.scales.sign_noise, OFF_LINE_ROUNDING) * largest
         while True:
             way = (target - start) / (1.0 - start)

@@ -1,7 +1,7 @@
 """The generation of a coarse mesh from an arrangement of fibres, or from an image.
 
-Imports `case`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.sizes`, `mesh.tiles` and `microstructure`.  Main entries:
+Imports `case`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.tiles` and `microstructure`.  Main entries:
 `gmsh_mesher.begin` and `gmsh_mesher.NodedCell`.
 """
 
-__all__ = ["gmsh_mesher", "pixel_mesher"]
+__all__ = ["element_estimate", "gmsh_mesher", "pixel_mesher"]

@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 from feti_homog.case import cell_section
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.element_estimate import refuse_many
 from feti_homog.mesh.fill.shape_mesher import filled
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, NEAREST, PASSAGE_EDGE, SizeField
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
-from feti_homog.mesh.sizes.element_estimate import refuse_many
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, NEAREST, PASSAGE_EDGE, SizeField
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.typing import Bool, Float, Int32
 

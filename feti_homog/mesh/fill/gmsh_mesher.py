@@ -12,11 +12,11 @@ from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
+from feti_homog.mesh.fill import element_estimate
 from feti_homog.mesh.outline.bare_outline import BareOutline
+from feti_homog.mesh.outline.graded_size import MeshSizes
 from feti_homog.mesh.outline.lines import LineStations
 from feti_homog.mesh.outline.outline import Marks, Outline
-from feti_homog.mesh.sizes import element_estimate
-from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile
 from feti_homog.mesh.tiles.tiling import FilledTile, Regions, TilePolicy, Tiling, cut, is_tiled, tile_mesh, tiling
 from feti_homog.microstructure import Arrangement, arrangements, phase_names

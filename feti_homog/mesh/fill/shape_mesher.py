@@ -13,11 +13,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.element_estimate import refuse_many
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
-from feti_homog.mesh.sizes.element_estimate import refuse_many
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import convex_sums

@@ -1,6 +1,6 @@
-"""The cell lines, with nodes: sides, fibre arcs, and bridges between fibres.
+"""The cell lines, with sizes and nodes: sides, fibre arcs, and bridges between fibres.
 
-Imports `mesh.sizes`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
+Imports `case`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """
 
-__all__ = ["lines", "outline"]
+__all__ = ["graded_size", "lines", "outline"]

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline import lines, outline
+from feti_homog.mesh.outline.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves, Lines, LineStations, Segments, SizedLines
-from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Conics, Discs, Ellipses
 from feti_homog.typing import Bool, Float, Int

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.mesh.outline import graded_size
 from feti_homog.mesh.outline.lines import Lines
 from feti_homog.mesh.outline.outline import TURN
-from feti_homog.mesh.sizes import graded_size
 from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import Ellipses, convex_sums, directions, gaps
 from feti_homog.typing import Float, Int

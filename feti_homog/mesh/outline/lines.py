@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.mesh.outline.graded_size import SizeField
 from feti_homog.microstructure.shapes import on_circle
-from feti_homog.system.parallel import dividing
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Float, Int
 
 # Regions beside a curve that are neither a disc nor a coating.
@@ -50,7 +50,8 @@ class Curves:
     def chosen(self, some: Int) -> Curves:
         """Select the curves with the indices `some` (k,)."""
         counts = np.diff(self.first)[some]
-        node, first = self.node[dividing.ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
+        node = self.node[distributed_arrays.ranges(self.first[some], counts)]
+        first = np.concatenate([[0], np.cumsum(counts)])
         return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
@@ -263,7 +264,8 @@ class SizedLines:
 
     def parts(self, count: int) -> list[SizedLines]:
         """Divide the lines, in order, into `count` parts of equal size."""
-        ends = zip(*(pairwise(dividing.even(len(lines), count)) for lines in (self.arcs, self.bridges)), strict=True)
+        bounds = (distributed_arrays.even(len(lines), count) for lines in (self.arcs, self.bridges))
+        ends = zip(*map(pairwise, bounds), strict=True)
         return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
+from feti_homog.mesh.outline.graded_size import CHUNK, wrap
 from feti_homog.mesh.outline.outline import TURN, Bridges, OnCircles
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.mesh.sizes.graded_size import CHUNK, wrap
 from feti_homog.microstructure import arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int

@@ -11,8 +11,8 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH
 from feti_homog.microstructure import arrangements
 from feti_homog.typing import Array, Float, Int, Int32
 

@@ -5,8 +5,11 @@ that the rank has filled: outline numbers identify nodes on lines, the following
 tile by tile, and the two classes of a torus edge determine the number of the edge.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import QhullError
@@ -15,11 +18,13 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys
 from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Bridges, Marks, Outline, crossings, curve_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
-from feti_homog.mesh.tiles import matrix_faces
 from feti_homog.mesh.tiles.tile_filling import Filling, Tile, arc_edges
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Discs, Ellipses
 from feti_homog.typing import Array, Int
+
+if TYPE_CHECKING:
+    from feti_homog.mesh.tiles import matrix_faces
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,8 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
     """
     if not is_tiled(arrangement, policy):
         return None
+    from feti_homog.mesh.tiles import matrix_faces  # few cells have tiles
+
     size = arrangement.size
     discs, disc, around = images(arrangement)
     assert isinstance(discs, Discs)
@@ -117,6 +124,8 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
     """
     if tiles is None:
         return [cell]
+    from feti_homog.mesh.tiles import matrix_faces
+
     # The tiles on both sides of each curve, OUTSIDE beyond the sides.
     curves, matrix = cell.curves, tiles.matrix
     on_left, on_right = tiles.within[curves.inside], tiles.within[curves.outside]

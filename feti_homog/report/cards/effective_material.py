@@ -1,4 +1,7 @@
-"""The effective material of a result in card axes (axis 1 along the fibre), and the text parts of all cards."""
+"""The effective material of a result in card axes (axis 1 along the fibre), text of all cards, cards of conductors.
+
+Abaqus Keywords Guide and CalculiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS: KXX, KYY, KZZ.
+"""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -27,6 +30,7 @@ AXES = (
     f"{', '.join(engineering_constants.OF_THE_CELL)} of this card are "
     f"{', '.join(engineering_constants.OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
 )
+CONDUCTOR_AXES = "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. q = -k grad T."
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
 """Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
@@ -219,3 +223,39 @@ def identifier(name: str) -> str:
     """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
+
+
+def conductor_card(document: Document, form: str, symmetry: str) -> str:
+    """Return the card for a conductivity, as computed or the nearest one that is "transversely isotropic".
+
+    Couplings up to `NEGLIGIBLE` sqrt(k_ii k_jj) are left out.
+
+    Raises:
+        CaseError: the result did not converge, has larger couplings, or the format has no conductivity.
+        KeyError, TypeError, ValueError: the result is damaged.
+    """
+    require_done(document)
+    turn = np.ix_(FIBRE_FIRST, FIBRE_FIRST)
+    k = numbers(document["effective_conductivity"], (3, 3))[turn]
+    values, name = np.diag(k).copy(), document["case"]["name"]
+    couplings = float((np.abs(k) / np.sqrt(np.outer(values, values)))[~np.eye(3, dtype=bool)].max())
+    text = f"Couplings of up to {couplings:.2g} sqrt(kii kjj) are left out."
+    if symmetry == "transversely isotropic":
+        values[1:], text = values[1:].mean(), f"{text} k22 and k33 are the mean across the fibres."
+    elif couplings > NEGLIGIBLE:
+        raise CaseError("its conductivity has couplings in its axes; use --transversely-isotropic")
+    origin = f"Effective conductivity of {name}, by feti_homog {document['version']}; nothing is converted."
+    paragraphs = [origin, CONDUCTOR_AXES, text]
+    if (errors := (document.get("mesh_error") or {}).get("effective_conductivity")) is not None:
+        estimates = np.diag(numbers(errors, (3, 3))[turn])
+        named = ", ".join(f"k{i + 1}{i + 1} {error:.1e}" for i, error in enumerate(estimates))
+        paragraphs.append(f"Estimated errors by the mesh: {named}.")
+    words = [number(value, 20) for value in values]
+    if form in ("abaqus", "calculix"):
+        keywords = [f"*MATERIAL, NAME={identifier(name)}", "*CONDUCTIVITY, TYPE=ORTHO"]
+        return "\n".join([*comment_lines(paragraphs, "**"), *keywords, ", ".join(words)])
+    if form == "ansys":
+        paragraphs.append("Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
+        commands = [f"MP,K{axis * 2},1,{word}" for axis, word in zip("XYZ", words, strict=True)]
+        return "\n".join([*comment_lines(paragraphs, "!"), *commands])
+    raise CaseError(f"--format {form} has no card of a conductivity; expected one of abaqus, calculix, ansys")

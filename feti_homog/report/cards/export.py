@@ -23,7 +23,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, voigt
-from feti_homog.report.cards import effective_conductor, effective_material
+from feti_homog.report.cards import effective_material
 from feti_homog.results import output_folder, result_json
 from feti_homog.typing import Document
 
@@ -191,7 +191,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
     """Return the card for a result with a stiffness or a conductivity.  Raises as `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
-        return effective_conductor.card(document, form, symmetry)
+        return effective_material.conductor_card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))
 
 

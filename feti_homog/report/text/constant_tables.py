@@ -1,17 +1,206 @@
-"""Constants in the axes of the material, and derivatives of constants, as tables.
+"""Tables of stiffness, thermal constants, moduli and engineering constants, bounds, estimates and derivatives.
 
 Material axes 1, 2, 3, as in data sheets and cards, are the cell axes x3 (the fibres), x1, x2.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from math import floor, log10
 from typing import Any
 
 import numpy as np
 
 from feti_homog.materials import engineering_constants, voigt
-from feti_homog.report.text.stiffness_tables import ENGINEERING, with_errors
-from feti_homog.report.text.tables import UNKNOWN, Column, Table, stress_label, without_noise
+from feti_homog.microstructure import phase_names
+from feti_homog.report.text.tables import UNKNOWN, Column, Table, number, stress_label, without_noise
 from feti_homog.typing import Document
+
+NAMES = Column("", -28)
+STIFF = ("C11", "C22", "C33")
+STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the stress unit; other moduli are ratios
+ENGINEERING = ("E1", "E2", "E3", "G12", "G13", "G23", "nu12", "nu13", "nu23")
+THERMAL = {
+    "thermal_stress": "thermal stress",
+    "thermal_stress_compression": "under minus one",
+    "thermal_expansion": "thermal expansion",
+}
+THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
+MESH_ERROR = "Mesh error, estimated"
+PAIRS = 2  # constants per line of text
+# Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
+SHOWN = {
+    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33"),
+    True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
+}
+MOST = 9  # of other constants
+
+
+def stiffnesses(document: Document) -> list[Table]:
+    """Return tables of L^ef, also under minus the unit strains.  All entries have the decimals of the largest entry."""
+    titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
+    tables, errors, label = list[Table](), _errors(document), stress_label(document)
+    for key, title in titles.items():
+        if document.get(key) is not None:
+            axes = "" if len(document[key]) == len(voigt.STRAINS) else f", {engineering_constants.CELL_AXES}"
+            tables.append(_matrix(f"{title}{axes}{label}", document[key]))
+        if errors.get(key) is not None:
+            tables.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
+    return tables
+
+
+def conductivity(document: Document) -> list[Table]:
+    """Return tables of k^ef and its mesh errors, with closed forms and bounds for the directions across."""
+    names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
+    title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
+    matrices = (title, k, ".8g"), (MESH_ERROR, errors.get("effective_conductivity"), ".1e")
+    tables = [
+        Table(title, [Column("", -6), *(Column(name, 16, form) for name in names)],
+              [[name, *row] for name, row in zip(names, np.array(matrix).tolist(), strict=True)])
+        for title, matrix, form in matrices if matrix is not None
+    ]  # fmt: skip
+    if (forms := document.get("conductivity_estimates")) is not None:
+        rows = [["along: mean", UNKNOWN, k[2][2], UNKNOWN, forms["axial"]]]
+        for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
+            lower, upper = forms.get(key) or (None, None)
+            rows += [[f"{name} {label}", lower, k[i][i], upper, UNKNOWN] for i, name in enumerate(names[:2]) if lower]
+        if forms.get("maxwell") and not forms.get("hashin_shtrikman"):  # of bonded fibres one of these bounds
+            rows.append(["across: Maxwell", UNKNOWN, (k[0][0] + k[1][1]) / 2, UNKNOWN, forms["maxwell"]])
+        columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper", "estimate"))]
+        tables.append(Table("Bounds and estimates", columns, rows, title_in_head=True))
+    return tables
+
+
+def _errors(document: Document) -> Document:
+    """Return the mesh errors of a result; empty without estimates."""
+    estimated: Document = document.get("mesh_error") or {}
+    return estimated
+
+
+def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
+    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals.
+
+    Errors have two digits, and constants as many decimals as their errors.
+    """
+    rows = []
+    for name, value in values.items():
+        error, form = errors.get(name), ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
+        error_form = ".1e"
+        # Other errors are below the digits printed without them, or their constants have extreme sizes.
+        if error is not None and error > 1e-7 * abs(value) and 1e-4 < abs(value) < 1e8:
+            form = error_form = f".{max(0, 1 - floor(log10(error)))}f"
+        texts = [name, number(value, form), "" if error is None else f"+- {error:{error_form}}"]
+        rows.append(texts[: 3 if errors else 2])
+    width = max((len(name) for name in values), default=0) + 2
+    columns = [Column("", -width, indent=0), Column("computed", 13), Column("mesh error", -13, indent=1)]
+    return Table(title, columns[: 3 if errors else 2], rows, abreast=abreast)
+
+
+def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Table:
+    strains, stresses = voigt.voigt_names(len(rows))
+    in_plane = len(rows) == len(voigt.STRAINS)
+    names, width, digits, limit, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
+    largest = max(abs(entry) for row in rows for entry in row)
+    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < limit else short
+    form = fixed or form
+    named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
+    return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
+
+
+def thermal(document: Document) -> list[Table]:
+    """Return tables of the thermal constants: a row per component, a column per known quantity."""
+    present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
+    names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
+    errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
+    values = [np.array(document[key], float) for key in present]
+    rounded = [np.where(np.abs(v) > 10.0**-7 * np.abs(v).max(), v, 0.0).tolist() for v in values]
+    rows = list(zip(names, *rounded, *errors.values(), strict=True))
+    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
+    columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
+    unit = f"; stresses{label}" if (label := stress_label(document)) else ""
+    title = f"Per unit of temperature, {engineering_constants.CELL_AXES}{unit}"
+    return [Table(title, columns, rows)] if present else []
+
+
+def moduli(document: Document) -> Table:
+    """Return a table of the engineering moduli in the plane; text has moduli at the left, ratios at the right."""
+    values, errors = document["moduli"], _errors(document).get("constants", {})
+    sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
+    names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
+    title = f"Engineering moduli{stress_label(document)}"
+    return with_errors(title, {name: values[name] for name in names}, errors, PAIRS)
+
+
+def bounds(document: Document) -> Table:
+    """Return a table of computed constants between their bounds; values outside are marked."""
+    if not document.get("bounds"):
+        return Table("Bounds: none of cells with voids", [], [])
+    limits, computed, rows = document["bounds"], document["effective_stiffness"], []
+    for i, name in enumerate(STIFF):
+        lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]
+        inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
+        rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
+    # These bounds hold for isotropic cells only, so a value outside is no fault.
+    for name, (lower, upper) in (limits["hashin_shtrikman"] or {}).items():
+        rows.append([f"{name} Hashin-Shtr.", lower, document["moduli"][name], upper])
+    columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
+    columns += [Column("", 9)] if any(len(row) > len(columns) for row in rows) else []
+    return Table(f"Bounds{stress_label(document)}", columns, rows, title_in_head=True)
+
+
+def cell_constants(document: Document) -> list[Table]:
+    """Return tables of the engineering constants in space.
+
+    Constants about the fibre axis have estimates and bounds.
+    """
+    tables, values = list[Table](), document.get("constants")
+    errors, label = _errors(document).get("constants", {}), stress_label(document)
+    if values is not None:
+        title = f"Engineering constants, {engineering_constants.CELL_AXES}{label}"
+        tables.append(with_errors(title, {name: values[name] for name in ENGINEERING if name in values}, errors, 3))
+    if (cell := document.get("transversely_isotropic")) is None:
+        return tables
+    # A row for each source, a column for each constant known to at least one source.
+    limits, estimates = _known(document.get("fibre_bounds") or {}), document.get("estimates")
+    sources: dict[str, Document] = {THIS_CELL: cell, ITS_ERROR: errors}
+    sources |= {name.replace("_", " "): row for name, row in (estimates or {}).items()}
+    sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
+    numbers = {t: _known({n: row.get(n) for n in engineering_constants.ABOUT_FIBRES}) for t, row in sources.items()}
+    names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in numbers.values())]
+    rows = [
+        [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]
+        for title, row in numbers.items()
+        if row
+    ]
+    columns = [Column("", -22), *(Column(name, max(13, len(name) + 2)) for name in names)]
+    below = [f"  {UNKNOWN}: not available from this method"] if any(UNKNOWN in row for row in rows) else []
+    if estimates is None:
+        below.append(f"  closed-form estimates exist for {_with_estimates(document)} only")
+    title = f"Along the fibres and across them{label}; {100 * cell['deviation']:.2g} % from transversely isotropic"
+    above = []
+    if (across := document.get("transverse_moduli")) is not None:
+        ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
+        above.append(f"  over all directions across: {', '.join(ranges)}")
+    return [*tables, Table(title, columns, rows, above, below, most_columns=5)]
+
+
+def _with_estimates(document: Document) -> str:
+    """Name the cells for which estimates exist, unlike for this cell."""
+    case, cell = document.get("case", {}), document.get("cell", {})
+    if len(cell.get("fractions", ())) == 1:
+        return "composites"
+    if cell.get("porosity"):
+        return "cells without voids"
+    if phase_names.COATING in case.get("material", {}):
+        return "fibres without coatings"
+    return "round fibres that are bonded, all alike" if case.get("interface") else "round fibres"
+
+
+def _known(row: Document) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
+
+
+def _short(value: float | None, form: str = ".5g") -> str:
+    return UNKNOWN if value is None else f"{value:{form}}"
 
 
 def constants(document: Document) -> dict[str, float]:
@@ -41,14 +230,6 @@ def table(document: Document) -> Table:
     return with_errors(title, {name: computed[name] for name in ENGINEERING if name in computed}, errors, 3)
 
 
-# Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
-SHOWN = {
-    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33"),
-    True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
-}
-MOST = 9  # of other constants
-
-
 def sensitivities(document: Document) -> list[Table]:
     """Return tables of elasticities d ln c / d ln p and derivatives dc / dp; none without sensitivities."""
     if (section := document.get("sensitivities")) is None:
@@ -56,11 +237,11 @@ def sensitivities(document: Document) -> list[Table]:
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4
     at = [constants.index(name) for name in shown(constants)]
     values, slopes, shares = [section["constant_values"][k] for k in at], list[list[Any]](), list[list[Any]]()
-    for j, (name, number) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
+    for j, (name, parameter) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
         row = [section["derivatives"][k][j] for k in at]
         pairs = zip(row, values, strict=True)
         slopes.append([name, *row])
-        shares.append([name, *(without_noise(slope * number / c) if c else UNKNOWN for slope, c in pairs)])
+        shares.append([name, *(without_noise(slope * parameter / c) if c else UNKNOWN for slope, c in pairs)])
     text = "Elasticities, the relative change of a constant by that of a parameter"
     text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
     heads = [(constants[k], max(12, len(constants[k]) + 2)) for k in at]

@@ -11,16 +11,16 @@ from textwrap import wrap
 from typing import Any
 
 from feti_homog.materials import voigt
-from feti_homog.report.text import phase_tables
-from feti_homog.report.text.constant_tables import sensitivities, table
-from feti_homog.report.text.stiffness_tables import bounds, conductivity, constants, moduli, stiffnesses, thermal
-from feti_homog.report.text.tables import ERROR, WIDTH, Column, Table
+from feti_homog.report.text import constant_tables
+from feti_homog.report.text.tables import ERROR, UNKNOWN, WIDTH, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
 
 LABEL = 12  # characters of the labels at the left
 NAME = 28  # characters of the check names
 GLUE = "\N{NO-BREAK SPACE}"  # prevents a line break
 REMARKS = ("Remark", "Warning", "Fault")
+POINTS = 4  # of a curve, in tables of phase stresses
+STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "hydrostatic"}
 
 
 @dataclass(frozen=True)
@@ -118,24 +118,24 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 
         tables.append(path_table(document, most))
     elif name == "conductivity":
-        tables += conductivity(document)
+        tables += constant_tables.conductivity(document)
     elif name != "stiffness":
         from feti_homog.report.text import point_tables
 
         tables += point_tables.TABLES[name](document, most)
     if name in ("stiffness", "envelope"):
         is_spatial, has_interface = voigt.plane_state_of(document).is_spatial, document["case"].get("interface")
-        tables += [table(document)] if is_spatial and document.get("constants") else []
-        tables += stiffnesses(document)
+        tables += [constant_tables.table(document)] if is_spatial and document.get("constants") else []
+        tables += constant_tables.stiffnesses(document)
         if is_spatial:
-            tables += [*thermal(document), *constants(document)]
+            tables += [*constant_tables.thermal(document), *constant_tables.cell_constants(document)]
         elif not has_interface:  # moduli and bounds are of bonded, linear composites
-            tables += [moduli(document), bounds(document)]
+            tables += [constant_tables.moduli(document), constant_tables.bounds(document)]
     if (tips := document.get("load", document).get("tips")) and tips["load"]:
         from feti_homog.report.text.point_tables import tip_table  # bonded cells have no tips
 
         tables.append(tip_table(document, tips))
-    return [*tables, *sensitivities(document), *phase_tables.phase_tables(document)]
+    return [*tables, *constant_tables.sensitivities(document), *phase_tables(document)]
 
 
 def title_of(document: Document) -> str:
@@ -208,3 +208,52 @@ def _field(label: str, phrases: Iterable[str]) -> list[str]:
 
 def _number(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
+
+
+def phase_tables(document: Document) -> list[Table]:
+    """Return tables of stresses and utilisations in all states, or at some points on a curve; [] without stresses."""
+    phases = document.get("phase_stresses", ())
+    if not phases:
+        return []
+    labels, states = phases[0]["state"], _states(document, len(phases[0]["state"]))
+    pairs = [(phase, k) for k in states for phase in phases]
+    names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
+    first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
+    heads = [first, *(column for title in STRESSES.values() for column in (Column(title), Column("at", 16)))]
+    rows = [
+        [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
+        for name, (phase, k) in zip(names, pairs, strict=True)
+    ]
+    loads = ", under unit loads" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
+    tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
+    has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
+    is_mixed = bool(load.get("temperature")) and len([value for value in load.values() if value]) > 1
+    has_factors = "path" not in document and not is_mixed  # stresses in proportion to the load
+    used = list[list[Any]]()
+    for name, (phase, k) in zip(names, pairs, strict=True):
+        if "criterion" in phase:
+            value, place = _entry(phase, "utilisation", k)
+            used.append([name, phase["criterion"], value, place])
+            used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
+            used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
+    heads = [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)]
+    heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
+    notes = ["  load factor: at this multiple of the load the utilisation is 1"] * has_factors
+    return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
+
+
+def _states(document: Document, count: int) -> Sequence[int]:
+    """Return the numbers of the states that the tables show."""
+    if "path" in document and "states" in document:
+        from feti_homog.results import landmarks  # of paths alone
+
+        return landmarks.landmark_states(document, POINTS, count)
+    points = len(document.get("angle", ())) or (count if "path" in document else 1)
+    step, loads = -(-points // POINTS), count // points
+    return [point * loads + load for point in range(0, points, step) for load in range(loads)]
+
+
+def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
+    """Return a value and its position in words, "-" for the value zero."""
+    value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
+    return value, f"{x:.3g}, {y:.3g}" if value else "-"

@@ -3,4 +3,4 @@
 Imports `system.runtime`.  Main entries: `mpi_errors.run_main` and `mpi_errors.agree`.
 """
 
-__all__ = ["distributed_arrays", "dividing", "mpi_errors"]
+__all__ = ["distributed_arrays", "mpi_errors"]

@@ -1,27 +1,32 @@
-"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects of any size.
+"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects; division of loads.
 
 mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent in place.
 """
 
+import heapq
 from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
-from mpi4py import MPI
-from mpi4py.util import pkl5
 
-from feti_homog.system.parallel.dividing import even
-from feti_homog.typing import Array, Float, Int
+from feti_homog.typing import AnyInt, Array, Float, Int, Intracomm
 
 T = TypeVar("T")
 
 
-def scatter(comm: MPI.Intracomm, parts: list[T]) -> T:
+def _for_large_objects(comm: Intracomm) -> Intracomm:
+    """Return the communicator that sends Python objects of any size."""
+    from mpi4py.util import pkl5  # starts MPI
+
+    return pkl5.Intracomm(comm)
+
+
+def scatter(comm: Intracomm, parts: list[T]) -> T:
     """Send part r of the list on rank 0 to rank r, and return the received part.  Collective.
 
     The list on rank 0 is empty afterwards.
     """
-    large = pkl5.Intracomm(comm)
+    large = _for_large_objects(comm)
     if comm.rank:
         received: T = large.recv(source=0)
         return received
@@ -30,18 +35,18 @@ def scatter(comm: MPI.Intracomm, parts: list[T]) -> T:
     return parts.pop()
 
 
-def gather(comm: MPI.Intracomm, part: T) -> list[T]:
+def gather(comm: Intracomm, part: T) -> list[T]:
     """Gather the parts of all ranks on rank 0, by rank; other ranks return [].  Collective."""
-    large = pkl5.Intracomm(comm)
+    large = _for_large_objects(comm)
     if comm.rank:
         large.send(part, dest=0)
         return []
     return [part, *(large.recv(source=r) for r in range(1, comm.size))]
 
 
-def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
+def alltoall(comm: Intracomm, parts: list[T]) -> list[T]:
     """Send part r to rank r, and return the received parts, by rank of the sender.  Collective."""
-    large = pkl5.Intracomm(comm)
+    large = _for_large_objects(comm)
     received = list(parts)
     for step in range(1, comm.size):
         to, source = (comm.rank + step) % comm.size, (comm.rank - step) % comm.size
@@ -51,14 +56,14 @@ def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
     return received
 
 
-def allreduce_sum(comm: MPI.Intracomm, part: Float) -> Float:
+def allreduce_sum(comm: Intracomm, part: Float) -> Float:
     """Sum arrays `part` of equal shape over ranks, on every rank.  Collective."""
     total = np.empty_like(part)
     comm.Allreduce(part, total)
     return total
 
 
-def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Float:
+def gather_rows(comm: Intracomm, owned: Float, first: int, rows: Int) -> Float:
     """Gather rows (r,) or (r, k) of a distributed array on every rank.  Collective.
 
     Args:
@@ -69,11 +74,10 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
     mine = (rows >= first) & (rows < first + len(owned))
     values = np.zeros((len(rows), *owned.shape[1:]))
     values[mine] = owned[rows[mine] - first]
-    comm.Allreduce(MPI.IN_PLACE, values)
-    return values
+    return allreduce_sum(comm, values)
 
 
-def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
+def allgather_rows(comm: Intracomm, part: Array, counts: Int) -> Array:
     """Concatenate the rows of all ranks, on every rank: (sum(counts),) or (sum(counts), k).  Collective.
 
     Args:
@@ -85,7 +89,7 @@ def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
     return rows
 
 
-def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
+def share_columns(comm: Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
     """Return solve(B) on every rank for B (n,) or (n, k); every rank solves for a share of the columns.  Collective.
 
     B is equal on all ranks.
@@ -99,7 +103,7 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
     return allgather_rows(comm, part, np.diff(ends)).T
 
 
-def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
+def exchange(comm: Intracomm, to: Int, *columns: Array) -> list[Array]:
     """Send row i of all columns, (k,) or (k, ...), to rank `to[i]`; return the received rows.  Collective.
 
     Received rows are sorted by sender; rows of one sender keep their order.
@@ -120,3 +124,26 @@ def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
 def scale_rows(weights: Float, x: Float) -> Float:
     """Compute diag(weights) x for weights (m,) and x (m,) or (m, k)."""
     return np.asarray((weights if x.ndim == 1 else weights[:, None]) * x)
+
+
+def balanced(load: AnyInt, n_ranks: int) -> Int:
+    """Assign loads (n,) to ranks (n,): in descending order, to the rank with the least load."""
+    ranks = np.zeros(len(load), np.int64)
+    heap = [(0, rank) for rank in range(n_ranks)]
+    for k in np.argsort(-load, kind="stable"):
+        total, rank = heap[0]
+        ranks[k] = rank
+        heapq.heapreplace(heap, (total + int(load[k]), rank))
+    return ranks
+
+
+def even(count: int, parts: int) -> Int:
+    """Return the bounds (parts + 1,) of ranges that divide 0 .. count - 1; lengths differ by at most 1."""
+    return np.arange(parts + 1) * count // parts
+
+
+def ranges(start: Int, count: Int) -> Int:
+    """Concatenate the ranges start[i] .. start[i] + count[i] - 1 for start, count (n,)."""
+    ends = np.cumsum(count)
+    shift: Int = np.repeat(start - ends + count, count)
+    return shift + np.arange(count.sum(), dtype=np.int64)

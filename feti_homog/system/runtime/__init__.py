@@ -1,11 +1,8 @@
 """The process: memory, progress, locks of files, signals, standard streams; records for documents.
 
-Imports nothing.  Main entries: `progress_bar.Progress`, `file_locks`, `standard_streams`.
+Imports nothing.  Main entries: `standard_streams.Progress`, `file_locks`, `input_files`.
 """
 
 from feti_homog.system.runtime.records import described
 
-__all__ = [
-    "described", "environment", "file_locks", "input_files", "process_memory", "progress_bar",
-    "records", "standard_streams",
-]  # fmt: skip
+__all__ = ["described", "file_locks", "input_files", "process", "records", "standard_streams"]

@@ -1,10 +1,12 @@
-"""Standard output and error, whose failure does not stop a run, and signals that end the process.
+"""Standard output and error, whose failure does not stop a run, progress on them, and signals that end the process.
 
 After Ctrl-C, or a signal of a launcher or batch system, the process prints one line and ends at once.  Python runs
 signal handlers only between its bytecodes, which a mesher or a factorization may delay for long; libraries replace
 handlers; and an exception in the middle of a collective call would leave other ranks waiting.  So the signals are
 blocked, and a thread waits for them.
 """
+
+from __future__ import annotations
 
 import contextlib
 import io
@@ -13,9 +15,15 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from feti_homog.errors import FetiHomogError, escaped
-from feti_homog.system.runtime import file_locks
+from feti_homog.system.runtime import file_locks, process
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit of CPU time
 # Variables with the rank of a process, which launchers set before MPI starts.
@@ -96,3 +104,57 @@ def complain(*lines: str) -> None:
     """Print lines on standard error; a failure is ignored."""
     with contextlib.suppress(OSError):
         print(*(escaped(line, KEPT) for line in lines), sep="\n", file=sys.stderr, flush=True)
+
+
+class Progress:
+    """The progress of a run: lines on rank 0, unless `quiet`, and `seconds` by stage.
+
+    `within` gets the finished share of the case and its words, in place of a bar.
+    """
+
+    def __init__(self, comm: Intracomm, quiet: bool, within: Callable[[float, str], object] | None = None) -> None:
+        self.comm, self.within = comm, within
+        self.prints = comm.rank == 0 and not quiet
+        # Even without a terminal, mpirun gives rank 0 a terminal for its output, but none for its errors.
+        self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty() and find_spec("tqdm") is not None
+        self.seconds: dict[str, float] = {}
+        self._inner_seconds = [0.0]  # times of stages within the open stages, with the innermost open stage last
+
+    def say(self, line: str) -> None:
+        """Print one line on rank 0, above a progress bar."""
+        if self.on_terminal:
+            from tqdm import tqdm
+
+            with tqdm.external_write_mode(file=sys.stdout):
+                say(line)
+        elif self.prints:
+            say(line)
+
+    @contextlib.contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """Time a block as a stage of the run and of PETSc's log, and print its time.
+
+        The block may append remarks to the list, which are printed with the time, less the times of inner stages.
+        """
+        from petsc4py import PETSc
+
+        notes: list[str] = []
+        start = time.perf_counter()
+        self._inner_seconds.append(0.0)
+        try:
+            with PETSc.Log.Stage(name):
+                yield notes
+        finally:
+            seconds = time.perf_counter() - start
+            own_seconds = seconds - self._inner_seconds.pop()
+            self._inner_seconds[-1] += seconds
+        self.seconds[name] = self.seconds.get(name, 0.0) + own_seconds
+        self.say(f"{name:<9} {own_seconds:8.2f} s  {' '.join(notes)}".rstrip())
+
+    def timings(self) -> dict[str, float]:
+        """Return the seconds by stage, the maximum over ranks.  Collective."""
+        return {name: max(self.comm.allgather(seconds)) for name, seconds in self.seconds.items()}
+
+    def memory(self) -> int:
+        """Return the peak of resident memory in bytes, the maximum over ranks.  Collective."""
+        return int(max(self.comm.allgather(process.peak_memory())))

@@ -13,7 +13,7 @@ from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization import unit_cell
 from feti_homog.results import output_folder
 from feti_homog.system.runtime import file_locks
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 SINGULAR = np.linalg.LinAlgError("singular")
 

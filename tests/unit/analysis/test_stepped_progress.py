@@ -8,7 +8,7 @@ import tqdm
 from mpi4py import MPI
 
 from feti_homog.analysis import stepped_progress
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 
 class Words(Progress):

@@ -15,7 +15,7 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_table import read_table
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'
 FIBRES = 'fibre_list = [{x = 1, y = 2, radius = 0.3}, {x = 2.8, y = 2, radius = 0.3, phase = "fibre:2"}]'

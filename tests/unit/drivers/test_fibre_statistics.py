@@ -16,7 +16,7 @@ from feti_homog.analysis.runner import run
 from feti_homog.case import cases
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.microstructure.random_fibres import nearest_neighbours
-from feti_homog.system.runtime.progress_bar import Progress
+from feti_homog.system.runtime.standard_streams import Progress
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SMALL = BASE.replace('geometry = "hexagonal"\n', f"{RANDOM}width = 40.0\n").replace("0.05", "0.1")

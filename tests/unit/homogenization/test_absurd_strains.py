@@ -10,8 +10,7 @@ from support.loaded_twins import document
 
 from feti_homog import Case, run
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.load_scales import LoadScales
-from feti_homog.interface.loads import Load
+from feti_homog.interface.loads import Load, LoadScales
 
 STIFFNESS = np.diag([4.0, 4.0, 1.0])
 

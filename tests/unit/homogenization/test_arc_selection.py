@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.case import cases
 from feti_homog.homogenization import arc_selection
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate, triangles_of_a_tip
+from feti_homog.mesh.fill.element_estimate import ElementEstimate, triangles_of_a_tip
 
 CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05}
 RADIUS = np.sqrt(0.4 / np.pi)

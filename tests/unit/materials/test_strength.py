@@ -5,8 +5,8 @@ import pytest
 
 from feti_homog import Case
 from feti_homog.errors import CaseError
-from feti_homog.materials import strength, voigt
-from feti_homog.materials.material_forms import PhaseStrength
+from feti_homog.materials import voigt
+from feti_homog.materials.material_forms import PhaseStrength, utilisation
 
 HASHIN = {
     "axial_tension": 3500.0, "axial_compression": 2500.0, "axial_shear": 80.0, "transverse_tension": 60.0,
@@ -21,7 +21,7 @@ def used(keys, stress):
     in_plane, S33, shears = rows[:, voigt.IN_PLANE], rows[:, 2], rows[:, [3, 4]]
     principal = voigt.spatial_principal(in_plane, S33, shears)[:, 0]
     von_mises = voigt.spatial_von_mises(in_plane, S33, shears)
-    modes = strength.utilisation(PhaseStrength(**keys), rows, principal, von_mises)[0]
+    modes = utilisation(PhaseStrength(**keys), rows, principal, von_mises)[0]
     assert len(modes) == (4 if keys == HASHIN else 1)
     return modes.max()
 

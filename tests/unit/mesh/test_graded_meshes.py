@@ -15,8 +15,8 @@ from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.sizes import element_estimate
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
+from feti_homog.mesh.fill import element_estimate
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 
 pytestmark = pytest.mark.slow
 

@@ -9,8 +9,8 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.cell_sizes import fibre_counts
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
+from feti_homog.mesh.fill.element_estimate import ElementEstimate
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 
 MIX = {"glass": 0.3, "carbon": 0.25}
 RADII = {"glass": 6.0, "carbon": 3.5}

@@ -17,8 +17,8 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, voids
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
+from feti_homog.mesh.outline.graded_size import MeshSizes
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.convex_sums import ConvexSums
 from feti_homog.microstructure.shapes.shapes import outlines_of

@@ -12,7 +12,7 @@ from feti_homog.feti.linalg.dense_matrices import check_lapack, cholesky, invert
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, power_of_two
 from feti_homog.feti.linalg.sparse_matrices import DistributedSolver, assemble_owned_rows, sum_of_blocks
 from feti_homog.system.petsc.options_database import case_options
-from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime import process
 
 PAGE, MEGABYTE = 4096, 2**20
 
@@ -23,7 +23,7 @@ def laplacian(n=60):
 
 
 def resident():
-    process_memory.trim()
+    process.trim_memory()
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
 
 

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.phase_laws import bond_law
 from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.laws import law_of_sections
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.softening import BilinearLaw, ExponentialLaw, TableLaw
 
@@ -140,10 +140,10 @@ def test_levels_of_damage_are_those_of_all_pairs_whatever_the_nodes():
         InterfaceSection(criterion="bilinear", normal_toughness=G, tangential_toughness=2 * G, **given)
         for G in (0.01, 1.0)
     ]
-    short, long = (bond_law([section], np.zeros(1, np.int64)) for section in sections)
+    short, long = (law_of_sections([section], np.zeros(1, np.int64)) for section in sections)
     assert len(short.levels) < len(long.levels) and long.levels == made("bilinear", None).levels
     for pair in ([0, 0], [1], [0, 1], []):
-        law = bond_law(sections, np.array(pair, np.int64))
+        law = law_of_sections(sections, np.array(pair, np.int64))
         assert law.levels == long.levels
         np.testing.assert_array_equal(law.normal_toughness, np.array([0.01, 1.0])[np.array(pair, int)])
     shear = np.array([[0.0, 1.0]])

@@ -12,7 +12,7 @@ from support.generated_meshes import generate
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.outline.bare_outline import BareOutline
-from feti_homog.mesh.sizes.graded_size import MeshSizes
+from feti_homog.mesh.outline.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tile_filling import Tile, fill
 
 CELLS = {

@@ -8,7 +8,7 @@ import pytest
 from support.base_case import BASE
 
 from feti_homog.report.text import study_tables
-from feti_homog.studies import fit_result
+from feti_homog.studies import estimation
 from feti_homog.studies.estimation import summarize
 from feti_homog.studies.fit_file import parse
 
@@ -24,7 +24,7 @@ def test_an_unknown_with_a_scatter_beyond_its_bounds_is_named(slope, status):
     fit = parse(tomllib.loads(BASE + TEXT), Path())
     bounds = np.array([50.0]), np.array([500.0])
     measured = np.array([150.0]), np.array([1.5])
-    found = fit_result.content(
+    found = estimation.fit_document(
         fit.unknowns, fit.data, summarize(np.array([200.0]), measured[0], measured, np.array([[slope]]), bounds)
     )
     assert found["status"] == status
@@ -39,7 +39,7 @@ def test_a_fit_that_its_bounds_keep_from_the_data_has_a_remark(computed, words):
     fit = parse(tomllib.loads(BASE + TEXT), Path())
     bounds, measured = (np.array([50.0]), np.array([500.0])), (np.array([150.0]), np.array([1.5]))
     found = summarize(bounds[1], np.array([computed]), measured, np.array([[1.0]]), bounds)
-    last = study_tables.fit_text(fit_result.content(fit.unknowns, fit.data, found)).splitlines()[-1]
+    last = study_tables.fit_text(estimation.fit_document(fit.unknowns, fit.data, found)).splitlines()[-1]
     assert last.endswith(words) and ("material.fibre.young at its upper bound" in last) == bool(words)
 
 
@@ -51,7 +51,7 @@ def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, 
     y, std, J = np.full(2, 150.0), np.full(2, 1.5), np.array([[slope], [0.0]])
     bounds = np.array([50.0]), np.array([500.0])
     estimates = summarize(np.array([200.0]), y + 1.5 * residual * np.array([0.0, 1.0]), (y, std), J, bounds)
-    found = fit_result.content(fit.unknowns, fit.data, estimates)
+    found = estimation.fit_document(fit.unknowns, fit.data, estimates)
     stalls = slope == 0.0  # and two degrees of freedom: exp(-x / 2) = 1e-3 at 3.72^2
     words = "stalled at material.fibre.young = 200, " if stalls else "does not describe the measurements (chance"
     expected = [words] if is_fault else ["no measured value depends"] * stalls
@@ -68,7 +68,7 @@ def test_every_printed_number_is_that_of_the_normal_equations():
     J, computed = np.array([[0.2, 1.0], [0.4, 0.5], [0.05, 0.3]]), y + np.array([3.0, -1.5, 0.25])
     bounds = np.array([50.0, 50.0]), np.array([500.0, 120.0])
     estimates = summarize(x, computed, (y, std), J, bounds)
-    text = study_tables.fit_text(fit_result.content(asked.unknowns, asked.data, estimates))
+    text = study_tables.fit_text(estimation.fit_document(asked.unknowns, asked.data, estimates))
     covariance = np.linalg.inv(J.T @ (J / std[:, None] ** 2))
     deviation, shares = np.sqrt(covariance.diagonal()), (covariance @ J.T / std) ** 2
     blocks = [[line.split() for line in part.splitlines()] for part in text.split("\n\n")]

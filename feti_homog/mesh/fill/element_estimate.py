@@ -10,7 +10,7 @@ import numpy as np
 
 from feti_homog.case import cell_section, cell_sizes
 from feti_homog.errors import MeshError
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND
 from feti_homog.microstructure import Arrangement
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from feti_homog.system.parallel.dividing import balanced, even, ranges
+from feti_homog.system.parallel.distributed_arrays import balanced, even, ranges
 
 
 def test_loads_are_balanced():

@@ -8,8 +8,8 @@ from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
-from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MeshSizes, SizeField, size_field
+from feti_homog.mesh.fill.element_estimate import ElementEstimate, refuse_many
+from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MeshSizes, SizeField, size_field
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 
 

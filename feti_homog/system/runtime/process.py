@@ -1,0 +1,119 @@
+"""The process: settings of its environment, limits before libraries are loaded, its memory, imports of Matplotlib.
+
+Settings precede the imports of NumPy, h5py and MPI.  Under too low limits the program would hang or crash without a
+message.
+"""
+
+import ctypes
+import importlib
+import math
+import os
+import resource
+import sys
+from collections.abc import MutableMapping
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+from feti_homog.errors import FetiHomogError
+
+SETTINGS = {
+    "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
+    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four threads for any OMP_NUM_THREADS, which take half of its time
+    "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
+    "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
+}
+# Writing 5 to this file resets the peak of resident memory; see proc(5).
+CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
+# Bytes: a stack for MPI, which does not start with a quarter of it; addresses for a small run on one rank.
+STACK, ADDRESSES = 1 << 20, 1 << 30
+
+
+def prepare_environment(environment: MutableMapping[str, str]) -> None:
+    """Set unset variables of SETTINGS; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
+    for name, value in SETTINGS.items():
+        if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
+            environment.setdefault(name, value)
+
+
+def require_limits() -> None:
+    """Check the limits of stack and addresses, before libraries are loaded.
+
+    Raises:
+        FetiHomogError: a limit is below STACK or ADDRESSES; one line for every limit.
+    """
+    limits = ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES)
+    faults = [
+        f"the {name} of the process is limited to {limit >> 10} KiB; expected at least {needed >> 10} KiB"
+        for name, kind, needed in limits
+        if (limit := resource.getrlimit(kind)[0]) != resource.RLIM_INFINITY and limit < needed
+    ]
+    if faults:
+        raise FetiHomogError(*faults)
+
+
+def trim_memory(kept: int = 0) -> None:
+    """Give freed memory of glibc back to the system, if it is more than `kept` bytes."""
+    if spare_memory() > kept:
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def peak_memory() -> int:
+    """Return the largest resident memory in bytes since `forget_peak`."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+class _Heap(ctypes.Structure):
+    """The structure of mallinfo2(3): counts of glibc about its memory."""
+
+    _fields_ = tuple((f"field_{k}", ctypes.c_size_t) for k in range(10))
+
+
+def spare_memory() -> float:
+    """Return the freed bytes that glibc keeps; inf before glibc 2.33, which has no such count."""
+    try:
+        count = ctypes.CDLL(None).mallinfo2
+    except AttributeError:
+        return math.inf
+    count.restype = _Heap
+    return float(count().field_8)  # fordblks
+
+
+def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
+    """Call `trim_memory`, and reset the peak of memory; if the system refuses, the old peak stays."""
+    trim_memory(kept)
+    with suppress(OSError):
+        clear_refs.write_text(RESET_PEAK)
+
+
+def prefer_own_toolkits() -> None:
+    """Search `mpl_toolkits` first beside the `matplotlib` that Python finds, without importing Matplotlib.
+
+    In an environment with --system-site-packages, Debian's matplotlib-nspkg.pth binds `mpl_toolkits` to Debian's folder
+    at the start of Python.  A Matplotlib in the environment cannot import its 3-D axes from there, and would warn.
+    """
+    matplotlib = find_spec("matplotlib")
+    if matplotlib is None or matplotlib.origin is None:
+        return
+    folder = Path(matplotlib.origin).parents[1] / "mpl_toolkits"
+    if folder.is_dir():
+        toolkits = importlib.import_module("mpl_toolkits")
+        toolkits.__path__ = [str(folder), *(path for path in toolkits.__path__ if path != str(folder))]
+
+
+def ignore_settings_of_the_folder() -> None:
+    """Import Matplotlib without the `matplotlibrc` of the current folder, and draw without windows.
+
+    Matplotlib would read this file on import, and raise an exception if the file is damaged.
+    """
+    os.environ["MPLBACKEND"] = "agg"
+    if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:
+        return
+    folder = os.open(".", os.O_RDONLY)
+    try:
+        os.chdir("/")
+        importlib.import_module("matplotlib")
+    finally:
+        os.fchdir(folder)
+        os.close(folder)
