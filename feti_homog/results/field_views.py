@@ -85,7 +85,7 @@ SPATIAL_VIEWS: tuple[View, ...] = (
 
 def add_views(file: Any) -> None:
     """Add all views to an open file with complete tables; empty tables have no views."""
-    for group, view in _views_of(file):
+    for group, view in views_of(file):
         original = file[f"{group}/{view.source}"]
         shape = (len(original), view.components) if view.components else (len(original),)
         layout = h5py.VirtualLayout(shape, original.dtype)
@@ -101,10 +101,10 @@ def add_views(file: Any) -> None:
 
 def bytes_of_views(file: Any) -> int:
     """Return an upper bound of the bytes that `add_views` adds."""
-    return (1 << 12) * (1 + len(_views_of(file)))  # measured: 0.9 KB for each view on average
+    return (1 << 12) * (1 + len(views_of(file)))  # measured: 0.9 KB for each view on average
 
 
-def _views_of(file: Any) -> list[tuple[str, View]]:
+def views_of(file: Any) -> list[tuple[str, View]]:
     """Return group and view for each view with existing, non-empty tables."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):

@@ -223,7 +223,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     """Reset a failed or damaged case to WAITING, without its error and events.  On one rank.  Raises as `set_aside`."""
     folder = directory / entry.folder
-    with atomic.write_errors(folder):
+    with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
     checkpoints.remove(folder)
     set_aside(directory, entry, status)
@@ -237,7 +237,7 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
     """
     folder = directory / entry.folder
     path = folder / result_json.NAME
-    with atomic.write_errors(folder):
+    with atomic.file_errors("write", folder):
         if path.exists():
             atomic.rename(path, path.with_name(f"{path.name}.{status.replace(' ', '_')}"))
         output_folder.remove_other_results(folder, ())
