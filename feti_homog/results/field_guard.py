@@ -54,6 +54,11 @@ def require_own(path: Path, state: int | None = None) -> None:
                         raise CaseError(f"{path}: no result: {group.name}/{name} is not a table of numbers in it")
             _require_layout(path, file, state)
             _require_mesh(path, file)
+            for group, view in field_views.views_of(file):
+                entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
+                shape = (len(original), view.components) if view.components else (len(original),)
+                if (entry.shape, entry.dtype, entry.is_virtual, entry.fillvalue) != (shape, original.dtype, True, 0):
+                    raise CaseError(f"cannot read {path}: /{view.path(group)} is no view of {original.name}")
     except (AttributeError, OSError, RuntimeError, KeyError) as error:
         raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(error.args[0])) from error
 
@@ -79,13 +84,10 @@ def _require_layout(path: Path, file: Any, state: int | None) -> None:
             place = f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name}"
             if shown not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
                 raise CaseError(f"{place} is {shown}, expected {expected}")
-            if is_read and not is_text:
-                _require_values(place, name, counts, entry if field_layout.rows_of(d) else attributes[d.name or name])
-    for group, view in field_views.views_of(file):
-        entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
-        shape = (len(original), view.components) if view.components else (len(original),)
-        if (entry.shape, entry.dtype, entry.is_virtual, entry.fillvalue) != (shape, original.dtype, True, 0):
-            raise CaseError(f"cannot read {path}: /{view.path(group)} is no view of {original.name}")
+            if is_read and field_layout.rows_of(d):
+                _require_values(place, name, counts, entry)
+            elif is_read and not is_text:
+                _require_values(place, name, counts, attributes[d.name or name])
 
 
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
@@ -109,22 +111,20 @@ def _require_mesh(path: Path, file: Any) -> None:
     size, refine = np.array([file.attrs["width"], file.attrs["height"]]), file.attrs["refine"]
     span = points.max(axis=0, initial=-np.inf) - points.min(axis=0, initial=np.inf)
     if not ((size > 0.0) & (size <= 4.0 * span)).all() or len(triangles) % 4**refine or not len(triangles):
-        cell = f"{size[0]:g} x {size[1]:g}"
-        raise CaseError(f"cannot read {path}: a cell of {cell}, refine = {refine}, has other nodes")
+        raise CaseError(f"cannot read {path}: a cell of {size[0]:g} x {size[1]:g}, refine = {refine}, has other nodes")
     reference, _ = shape_functions.quadrature(triangles.shape[1])
     for start in range(0, len(triangles), assembly.ELEMENTS_AT_ONCE):
         corners = points[triangles[start : start + assembly.ELEMENTS_AT_ONCE]]
         (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference, (1, 1)), (1, 3), (0, 1))
         flat += np.count_nonzero(xr * ys - yr * xs <= 1e-20 * span.prod())
     off = np.stack([file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")])
-    phases = file.attrs["phases"]
-    texts = [*phases, *(state.attrs["label"] for state in file.get("state", {}).values())]
+    phases, labels = file.attrs["phases"], [state.attrs["label"] for state in file.get("state", {}).values()]
     for holds, fault in (
         (not flat, f"{flat} elements have no area"),
         (np.isin(file["fibre/body"], file["mesh/body"]).all(), "a fibre has no elements"),
         ((np.abs(off - size * np.round(off / size)) <= 1e-5 * size.max()).all(), "interface nodes are not in the mesh"),
         (all({phase, phase.partition(":")[0]} & {*case["material"]} for phase in phases), "its case has other phases"),
-        (all(text.isprintable() and "$" not in text for text in texts), "a phase or label has other letters"),
+        (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name has other letters"),
     ):
         if not holds:
             raise CaseError(f"cannot read {path}: {fault}")
