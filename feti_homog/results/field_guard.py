@@ -1,6 +1,7 @@
 """Check links, sizes, layout and number ranges of all tables in result.h5 before other modules read it."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -29,12 +30,17 @@ def require_own(path: Path, state: int | None = None) -> None:
     """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
     Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or in the one
-    given.  Raises CaseError; FetiHomogError for an unreadable file.
+    given.  A child process reads the file, on which HDF5 may crash.  Raises CaseError; FetiHomogError if unreadable.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
         stored = " with --resume: the checkpoint has its events" if has_events else ""
         raise CaseError(f"cannot read {path}: it is missing; run the case again{stored}")
+    input_files.in_own_process(path, partial(require_tables, state=state), None, (1 << 30) + 4 * path.stat().st_size)
+
+
+def require_tables(path: Path, state: int | None) -> None:
+    """Check a file in this process, as `require_own`."""
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:
@@ -57,9 +63,10 @@ def require_own(path: Path, state: int | None = None) -> None:
             for group, view in field_views.views_of(file):
                 entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
                 shape = (len(original), view.components) if view.components else (len(original),)
+                entry[:1]  # which finds the sources
                 if (entry.shape, entry.dtype, entry.is_virtual, entry.fillvalue) != (shape, original.dtype, True, 0):
                     raise CaseError(f"cannot read {path}: /{view.path(group)} is no view of {original.name}")
-    except (AttributeError, OSError, RuntimeError, KeyError) as error:
+    except (AttributeError, OSError, RuntimeError, LookupError, TypeError, ValueError) as error:
         raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(error.args[0])) from error
 
 

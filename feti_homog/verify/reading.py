@@ -191,8 +191,7 @@ class ResultFiles:
             factor, point = float(attributes["load_factor"]), int(attributes["point"])
             x = self.mesh.points - self.mesh.points.min(axis=0)
             arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
-            state = State(name, strain, mean, factor, point, temperature=temperature, **arrays)
-            yield state
+            yield State(name, strain, mean, factor, point, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:
@@ -228,9 +227,8 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
         mesh, interface, fibres = ([file[f"{part}/{name}"][()] for name in names] for part, names in tables.items())
         size = np.array([file.attrs["width"], file.attrs["height"]], float)
         phases = tuple(map(str, file.attrs["phases"]))
-        document = Section(_document(directory / JSON))
-        parts = Mesh(*mesh), InterfaceRows(*interface), Fibres(*fibres)
-        files = ResultFiles(document, size, phases, *parts, file, changed)
+        parts = Mesh(*mesh), InterfaceRows(*interface), Fibres(*fibres), file, changed
+        files = ResultFiles(Section(_document(directory / JSON)), size, phases, *parts)
         pairs = {name for section in files.interfaces for name in section.get("between", ())}
         if not pairs <= set(phases):
             raise CaseError(f"{path}: the case has interfaces between unknown phases")

@@ -31,9 +31,9 @@ LINES = {
     "report": 3420 + 150 + 124,
     "results": 2430 + 110 + 40,
     "schema": 430 + 0 + 5,
-    "studies": 2950 + 55,
+    "studies": 2950 + 55 + 4,
     "system": 1770 + 8,
-    "verify": 3100 + 150 + 80,
+    "verify": 3100 + 150 + 76,
 }
 FILES, TOTAL = 310, 45000 + 368 + 1132
 # Percent of all lines: private functions that are called once, and imports.
