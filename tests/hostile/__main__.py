@@ -18,7 +18,7 @@ from hostile.running import in_one_job, in_processes, make
 # Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
 EVERY = {1: 1, 2: 5, 3: 11}
 OF_ONE_RANK = (events.FALSE_KIND, case_files.LONG_KIND)  # which another number of ranks refuses, or which rank 0 reads
-CASES, SEED = 200, 1
+CASES, SEED = 100, 1
 AT_ONCE = 2  # jobs, or processes: as many as the cores of a small machine
 
 

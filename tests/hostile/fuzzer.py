@@ -46,10 +46,10 @@ Case = tuple[tuple[str, ...], dict[str, Content]]
 
 
 def attempts(prepared: Path, count: int, seed: int) -> Iterator[Attempt]:
-    """Yield so many damaged inputs, of all kinds in turn."""
+    """Yield so many damaged inputs, of all kinds in turn, each of which has odd and even numbers."""
     rng, kinds = np.random.default_rng(seed), list(KINDS.items())
     for number in range(count):
-        kind, make = kinds[number % len(kinds)]
+        kind, make = kinds[(number + number // len(kinds)) % len(kinds)]
         words, files = make(prepared, rng)
         yield Attempt(f"random {kind}", f"{number} of seed {seed}", words, "", files, (0, 2, 3))
 
@@ -119,7 +119,8 @@ def _document(prepared: Path, rng: np.random.Generator) -> Case:
 
 def _sweep(prepared: Path, rng: np.random.Generator) -> Case:
     content = _changed_document(prepared / "sweep/sweep.json", rng)
-    return COMMANDS["collect"], {"out": copy_of(prepared / "sweep", sweep_json=content)}
+    words = *COMMANDS["collect"], *(("--no-pictures",) if rng.integers(3) else ())
+    return words, {"out": copy_of(prepared / "sweep", sweep_json=content)}
 
 
 def _changed_document(original: Path, rng: np.random.Generator) -> bytes:
