@@ -15,18 +15,15 @@ def verify(words: Sequence[str]) -> int:
     standard_streams.end_on_signals()
     prints = standard_streams.launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
+    from feti_homog.results import field_guard, output_folder
     from feti_homog.verify import certificate
 
     try:
         arguments = command_parser().parse_args(words)
         directory = arguments.directory
         if os.path.isdir(directory) and not os.path.lexists(directory / "result.json"):
-            from feti_homog.results import output_folder
-
             output_folder.refuse_begun(directory)
         if os.path.isfile(path := directory / "result.h5"):
-            from feti_homog.results import field_guard
-
             field_guard.require_own(path)
         outcome = certificate.verify(directory)
         if prints:

@@ -22,7 +22,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
         FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
     """
     part = part_of(path)
-    with write_errors(path):
+    with file_errors("write", path):
         try:
             file_locks.files.add(part)
             write(part)
@@ -61,7 +61,7 @@ def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
     Raises:
         FetiHomogError: the file cannot be written.
     """
-    with write_errors(path):
+    with file_errors("write", path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("r+b" if start else "wb") as stream:
             stream.seek(start)
@@ -86,11 +86,6 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):
             with contextlib.suppress(OSError):
                 path.unlink()
-
-
-def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
-    """Turn write errors in a block into FetiHomogError, as `file_errors` does."""
-    return file_errors("write", path)
 
 
 @contextlib.contextmanager

@@ -190,7 +190,7 @@ class FieldFile:
 
 def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
     """Call a function, and turn its write errors into FetiHomogError about `path`."""
-    with atomic.write_errors(path):
+    with atomic.file_errors("write", path):
         return function(*args)
 
 

@@ -1,28 +1,46 @@
-"""Check links, sizes and layout of all tables in result.h5 before any table is read."""
+"""Check links, sizes, layout and number ranges of all tables in result.h5 before other modules read it."""
 
-from math import inf
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 
 import h5py
+import numpy as np
 
 from feti_homog.case import cases
 from feti_homog.errors import CaseError
+from feti_homog.fem import assembly, shape_functions
 from feti_homog.results import field_layout, result_json
 from feti_homog.system.runtime import input_files, records
 
 ATTRIBUTES = {str: "text", tuple[str, ...]: "text", int: "int64"}
+# Least and largest numbers, the latter as the last of n nodes, m elements, k interface nodes, f fibres, p phases.
+RANGES: dict[str, tuple[float, float | str]] = {
+    **dict.fromkeys(("triangles", "fibre_node", "matrix_node"), (0, "n")), "vertex": (0, "k"), "phase": (0, "p"),
+    **dict.fromkeys(("body", "subdomain", "fibre"), (0, "m")), "rank": (0, 1 << 20), "fibre_number": (0, "f"),
+    "number": (1, "f"), "pair": (0, 1000), "status": (0, 2), "sliding": (-1, 1), "normal": (-1.01, 1.01),
+    "damage": (-1e-6, 1.000001), "refine": (0, 30), "point": (0, 1e9),
+    **dict.fromkeys(("length", "radius", "strength", "mesh_error"), (0.0, 1e100)),
+}  # fmt: skip
+MAY_BE_NAN = ("centre", "radius", "stress_33", "mesh_error")
 
 
-def require_own(path: Path) -> None:
+def require_own(path: Path, state: int | None = None) -> None:
     """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
-    Other links may lead to pipes, other files, or in circles.  Raises CaseError; FetiHomogError for an unreadable file.
+    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or in the one
+    given.  A child process reads the file, on which HDF5 may crash.  Raises CaseError; FetiHomogError if unreadable.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
         stored = " with --resume: the checkpoint has its events" if has_events else ""
         raise CaseError(f"cannot read {path}: it is missing; run the case again{stored}")
+    input_files.in_own_process(path, partial(require_tables, state=state), None, (1 << 30) + 4 * path.stat().st_size)
+
+
+def require_tables(path: Path, state: int | None) -> None:
+    """Check a file in this process, as `require_own`."""
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:
@@ -33,50 +51,87 @@ def require_own(path: Path) -> None:
                     if isinstance(entry, h5py.Group) and len(groups) << 10 < room[True]:
                         groups.append(entry)
                         continue
-                    is_table = (
-                        isinstance(entry, h5py.Dataset)
-                        and entry.shape is not None
-                        and not entry.external
-                        and entry.dtype.kind in "fiu"
-                    )
+                    is_table = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "fiu"
                     if is_table:
                         room[entry.is_virtual] -= entry.nbytes
-                        is_table = not entry.is_virtual or {s.file_name for s in entry.virtual_sources()} == {"."}
+                        sources = entry.virtual_sources() if entry.is_virtual else ()
+                        is_table = not entry.external and {source.file_name for source in sources} <= {"."}
                     if not is_table or min(room.values()) < 0:
                         raise CaseError(f"{path}: no result: {group.name}/{name} is not a table of numbers in it")
-            _require_layout(path, file)
-    except (AttributeError, OSError, RuntimeError, KeyError) as error:
+            _require_layout(path, file, state)
+            _require_mesh(path, file)
+            for group, view in field_layout.views_of(file):
+                entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
+                shape = (len(original), view.components) if view.components else (len(original),)
+                entry[:1]  # which finds the sources
+                if (entry.shape, entry.dtype, entry.is_virtual, entry.fillvalue) != (shape, original.dtype, True, 0):
+                    raise CaseError(f"cannot read {path}: /{view.path(group)} is no view of {original.name}")
+    except (AttributeError, OSError, RuntimeError, LookupError, TypeError, ValueError) as error:
         raise input_files.unreadable(path, error if isinstance(error, OSError) else OSError(error.args[0])) from error
 
 
-def _require_layout(path: Path, file: Any) -> None:
-    """Compare shapes and types with `field_layout`; the tables of points, triangles and fibres give the row counts."""
+def _require_layout(path: Path, file: Any, state: int | None) -> None:
+    """Compare shapes, types and ranges with `field_layout`; points, triangles and fibres give the row counts."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
-    counts = {symbol: str((*(entry.shape or ()), 0)[0]) for symbol, entry in entries.items()}
+    counts = {symbol: (*(entry.shape or ()), 0)[0] for symbol, entry in entries.items()}
     states = [f"state/{number}" for number in range(len(file.get("state", ())))]
-    is_spatial = any("axial_stress" in file[state] for state in states)
+    is_spatial = any("axial_stress" in file[name] for name in states)
     parts: dict[str, Any] = {"": field_layout.Header, "mesh": field_layout.MeshPart, "fibre": field_layout.FibrePart}
     of_state = field_layout.SpatialStatePart if is_spatial else field_layout.StatePart
     parts |= {"interface": field_layout.InterfacePart, **dict.fromkeys(states, of_state)}
     for group, part in parts.items():
-        hints = get_type_hints(part)
+        hints, is_read = get_type_hints(part), state is None or group in {*parts} - {*states} | {f"state/{state}"}
         for name, d in records.descriptions(part).items():
             attributes, shape = file[f"/{group}"].attrs, d.shape or "()"
             entry = file[f"{group}/{name}"] if field_layout.rows_of(d) else attributes.get_id(d.name or name)
             is_text = h5py.check_string_dtype(entry.dtype) == ("utf-8", None)
             shown = f"{'text' if is_text else entry.dtype.newbyteorder('=')} {entry.shape}"
             expected = f"{ATTRIBUTES.get(hints[name], d.dtype)} ({counts.get(shape[1], shape[1])}{shape[2:]}"
+            place = f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name}"
             if shown not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
-                raise CaseError(f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name} is {shown}, expected {expected}")
-    points, refine = file["mesh/points"][()], file.attrs["refine"]
-    spans = points.max(axis=0, initial=-inf) - points.min(axis=0, initial=inf)
-    sizes = file.attrs["width"], file.attrs["height"]
-    if refine < 0 or not all(0.0 < size <= 4.0 * span for size, span in zip(sizes, spans, strict=True)):
-        raise CaseError(
-            f"cannot read {path}: a cell of {sizes[0]:g} x {sizes[1]:g}, refine = {refine}, has other nodes"
-        )
+                raise CaseError(f"{place} is {shown}, expected {expected}")
+            if is_read and field_layout.rows_of(d):
+                _require_values(place, name, counts, entry)
+            elif is_read and not is_text:
+                _require_values(place, name, counts, attributes[d.name or name])
+
+
+def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
+    """Compare the numbers of a table or attribute with RANGES, a block of rows at a time."""
+    low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
+    high = counts[high] - (high != "f") if isinstance(high, str) else high
+    for start in range(0, len(table) if table.ndim else 1, assembly.ELEMENTS_AT_ONCE):
+        values = np.asarray(table[start : start + assembly.ELEMENTS_AT_ONCE] if table.ndim else table)
+        is_wrong = ~((low <= values) & (values <= high)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
+        if is_wrong.any():
+            raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {high:g}")
+
+
+def _require_mesh(path: Path, file: Any) -> None:
+    """Require a case with the phases, elements with an area, fibres in the mesh, and interface nodes at its nodes."""
     try:
-        cases.check_stored(result_json.loads(file.attrs["case"]))
+        cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:
         raise CaseError(f"cannot read {path}: the case in it is damaged: {str(error).splitlines()[0]}") from error
+    points, triangles, flat = file["mesh/points"][()], file["mesh/triangles"], 0
+    size, refine = np.array([file.attrs["width"], file.attrs["height"]]), file.attrs["refine"]
+    span = points.max(axis=0, initial=-np.inf) - points.min(axis=0, initial=np.inf)
+    if not ((size > 0.0) & (size <= 4.0 * span)).all() or len(triangles) % 4**refine or not len(triangles):
+        raise CaseError(f"cannot read {path}: a cell of {size[0]:g} x {size[1]:g}, refine = {refine}, has other nodes")
+    reference, _ = shape_functions.quadrature(triangles.shape[1])
+    for start in range(0, len(triangles), assembly.ELEMENTS_AT_ONCE):
+        corners = points[triangles[start : start + assembly.ELEMENTS_AT_ONCE]]
+        (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference, (1, 1)), (1, 3), (0, 1))
+        flat += np.count_nonzero(xr * ys - yr * xs <= 1e-20 * span.prod())
+    off = np.stack([file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")])
+    phases, labels = file.attrs["phases"], [state.attrs["label"] for state in file.get("state", {}).values()]
+    for holds, fault in (
+        (not flat, f"{flat} elements have no area"),
+        (np.isin(file["fibre/body"], file["mesh/body"]).all(), "a fibre has no elements"),
+        ((np.abs(off - size * np.round(off / size)) <= 1e-5 * size.max()).all(), "interface nodes are not in the mesh"),
+        (all({phase, phase.partition(":")[0]} & {*case["material"]} for phase in phases), "its case has other phases"),
+        (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name has other letters"),
+    ):
+        if not holds:
+            raise CaseError(f"cannot read {path}: {fault}")

@@ -111,10 +111,15 @@ def state_parts(
         problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
         in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
         common: dict[str, Any] = {"load_factor": load_factor, "point": point, "label": label}
-        common |= {"mesh_error": _relative(np.sum(shares, axis=0), *responses), "stress_33": stress[2]}
+        energy = sum(2 * part.stored for part in responses if part is not None)  # E . Sigma
+        common["mesh_error"] = (np.sum(shares, axis=0) / (energy if energy > 0 else 1.0)).astype(np.float32)
+        common["stress_33"] = stress[2]
         common["stress"] = stress[voigt.IN_PLANE].T
         if plane is not None and cell.axial is None:
-            common["stress_33"] = np.einsum("ev,ev->e", common["stress"], _rules_of_S33(cell))
+            laws_of = [cell.case.material_of(s.submesh.phase) for s in cell.parts]
+            rules = np.reshape([laws.out_of_plane(law, cell.case.analysis.plane)[0] for law in laws_of], (-1, 3))
+            rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # of elements
+            common["stress_33"] = np.einsum("ev,ev->e", common["stress"], rules)
             common |= _at_nodes(cell, response, in_plane)
             yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)
             continue
@@ -130,12 +135,6 @@ def state_parts(
             **common,
             **_at_nodes(cell, response, in_plane, along),
         )
-
-
-def _rules_of_S33(cell: unit_cell.TornCell) -> Float:
-    """Return the rows (e, 3) that give S33 in plane states from the in-plane stresses in each element."""
-    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane)[0] for s in cell.parts]
-    return np.repeat(np.reshape(rules, (-1, 3)), [len(s.mesh.triangles) for s in cell.parts], axis=0)
 
 
 def _at_nodes(
@@ -165,12 +164,6 @@ def _at_nodes(
         "damage": none.astype(float) if is_across else response.damage,
         "sliding": none if is_across else state.bonds.sliding_signs,
     }
-
-
-def _relative(shares: Float, *responses: averaging.Response | None) -> Float32:
-    """Divide the element errors (m,) by E . Sigma, summed over all responses."""
-    energy = sum(2 * response.stored for response in responses if response is not None)
-    return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:

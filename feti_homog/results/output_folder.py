@@ -264,7 +264,7 @@ class EventLog:
         if not self._wanted:
             return
         try:
-            with atomic.write_errors(self.path):
+            with atomic.file_errors("write", self.path):
                 if self._stream is None:
                     self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
                     print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)

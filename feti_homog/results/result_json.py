@@ -41,7 +41,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
         TypeError: a value has no JSON type.
     """
     text, path = text_of(document), Path(directory) / NAME
-    with atomic.write_errors(path):
+    with atomic.file_errors("write", path):
         path.parent.mkdir(parents=True, exist_ok=True)
     return atomic.replace_text(path, text)
 

@@ -58,7 +58,7 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
     Raises:
         CaseError: result.h5 is missing or cannot be read, or has no such state.
     """
-    field_guard.require_own(path := Path(out) / field_file.NAME)
+    field_guard.require_own(path := Path(out) / field_file.NAME, number)
     with h5py.File(path, "r", locking=False) as file:
         count = len(file.get("state", ()))
         if not 0 <= number < count:

@@ -67,7 +67,7 @@ def write(directory: Path) -> list[Path]:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
     h5, paths = Path(directory) / field_file.NAME, list[Path]()
-    with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
+    with atomic.file_errors("write", Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
         states = sorted(file.get("state", ()), key=int)
         labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
         longest = max((len(label.encode()) for label in labels), default=0)

@@ -156,12 +156,16 @@ def read_index(directory: Path) -> SweepIndex:
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**_replaced(entry, types.INF, math.inf)) for entry in document["cases"])
-        if not all(isinstance(e.number, int) and isinstance(e.inputs, dict) for e in entries):
-            raise TypeError("a case has no number or no inputs")
-        return SweepIndex(document["name"], document["stress_unit"], entries)
+        texts = document["name"], document["stress_unit"], *(entry.identity for entry in entries)
+        counts = [number for e in entries for number in (e.number, e.point, e.realisation)]
+        first, drawn = entries[0].inputs.keys(), "cell.fibre_fraction"
+        is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)
+        if not is_sound or not all(e.inputs.keys() == first and 0.0 < e.inputs.get(drawn, 0.5) < 1.0 for e in entries):
+            raise TypeError("a name, number or input of a case is missing or of another type")
+        return SweepIndex(*texts[:2], entries)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (AttributeError, ValueError, LookupError, TypeError) as error:
         reason = str(error).removeprefix("it is damaged: ")
         raise CaseError(f"{path} is damaged: {reason}; move it away and start the sweep again") from error
 
@@ -223,7 +227,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     """Reset a failed or damaged case to WAITING, without its error and events.  On one rank.  Raises as `set_aside`."""
     folder = directory / entry.folder
-    with atomic.write_errors(folder):
+    with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
     checkpoints.remove(folder)
     set_aside(directory, entry, status)
@@ -237,7 +241,7 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
     """
     folder = directory / entry.folder
     path = folder / result_json.NAME
-    with atomic.write_errors(folder):
+    with atomic.file_errors("write", folder):
         if path.exists():
             atomic.rename(path, path.with_name(f"{path.name}.{status.replace(' ', '_')}"))
         output_folder.remove_other_results(folder, ())

@@ -128,7 +128,7 @@ class Study(ABC):
         def begin() -> None:  # the document has the digest from the start
             with case_folders.document_lock(directory):
                 if is_new := not path.exists():
-                    with atomic.write_errors(directory):
+                    with atomic.file_errors("write", directory):
                         case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
                 else:
                     try:

@@ -22,7 +22,7 @@ from feti_homog.verify.path_energies import check_heat, check_losses, check_stor
 from feti_homog.verify.reading import COATING, FIELDS, JSON, opened
 
 # Exceptions that numbers with an unexpected kind or shape cause.
-DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
+DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError)
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,8 @@ def _verified(directory: Path) -> Certificate:
             title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
             status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
             return Certificate(findings.worst(), title, status, unchecked(document))
+    except OSError as error:
+        raise input_files.unreadable(directory / FIELDS, error) from error
     except DAMAGE as error:
         entry = f" (without {error})" if isinstance(error, KeyError) else ""
         raise CaseError(f"{directory}: {reason}{entry}") from error

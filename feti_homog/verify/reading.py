@@ -177,29 +177,21 @@ class ResultFiles:
 
     def states(self) -> Iterator[State]:
         """Yield the states in ascending order, with one state in memory at a time."""
-        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "mesh_error": (m,)}
-        shapes |= {"traction": (k, 2), "jump": (k, 2), "status": (k,), "damage": (k,), "sliding": (k,)}
+        names = "displacement", "stress", "stress_33", "mesh_error", "traction", "jump", "status", "damage", "sliding"
         for number in sorted(map(int, self.file.get("state", ()))):
-            with _reading(Path(self.file.filename)):
-                group = f"state/{number}"
-                attributes, table = self.file[group].attrs, partial(_table, self.file, group)
-                arrays = {name: table(name, shape) for name, shape in shapes.items()}
-                if self.is_spatial:
-                    for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
-                        arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
-                    plane, axial = arrays["stress"], table("axial_stress", (m, 2))
-                    arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
-                strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
-                v = arrays["stress"].shape[1]
-                has_size = strain.shape == mean.shape == (v,)
-                _expect(has_size, f"/{group} has strain {strain.shape} and stress {mean.shape}, expected size {v}")
-                name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
-                factor, point = float(attributes["load_factor"]), int(attributes["point"])
-                x = self.mesh.points - self.mesh.points.min(axis=0)
-                arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
-                state = State(name, strain, mean, factor, point, temperature=temperature, **arrays)
-            yield state
+            group = self.file[f"state/{number}"]
+            attributes, arrays = group.attrs, {name: group[name][()] for name in names}
+            if self.is_spatial:
+                for name in ("displacement", "traction", "jump"):
+                    arrays[name] = np.column_stack([arrays[name], group[f"axial_{name}"]])
+                plane, axial = arrays["stress"], group["axial_stress"][()]
+                arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
+            strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
+            name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
+            factor, point = float(attributes["load_factor"]), int(attributes["point"])
+            x = self.mesh.points - self.mesh.points.min(axis=0)
+            arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
+            yield State(name, strain, mean, factor, point, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:
@@ -213,7 +205,7 @@ def altered(directory: Path) -> tuple[str, ...]:
     text = input_files.read(directory / JSON).removesuffix(end) + b"\n}"
     unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text):08x}"}
     seal = document.get("result_h5")
-    with _reading(path), input_files.opened(path) as stream:
+    with input_files.opened(path) as stream:
         size, checksum = os.fstat(stream.fileno()).st_size, 0
         if isinstance(seal, dict) and seal.get("bytes") == size:  # a file with another size need not be read
             blocks = [zlib.crc32(block) for block in iter(partial(stream.read, CHECKSUM_BLOCK), b"")]
@@ -226,35 +218,20 @@ def altered(directory: Path) -> tuple[str, ...]:
 def opened(directory: Path) -> Iterator[ResultFiles]:
     """Open the results in a folder; raise CaseError, one line, if a file is unreadable."""
     changed, path = altered(directory), directory / FIELDS
-    with _reading(path):
-        file = h5py.File(path, "r")
-    with file:
-        with _reading(path):
-            n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
-            k, f = len(file["interface/points"]), len(file["fibre/radius"])
-            columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3
-            _expect(n > 0 and m > 0, "/mesh has no nodes or no elements")
-
-            def tables(group: str, **shapes: tuple[int, ...]) -> list[Any]:
-                return [_table(file, group, name, shape) for name, shape in shapes.items()]
-
-            mesh = Mesh(*tables("mesh", points=(n, 2), triangles=(m, columns), subdomain=(m,), phase=(m,), body=(m,)))
-            numbers = dict.fromkeys(("length", "fibre_number", "fibre", "pair"), (k,))
-            interface = InterfaceRows(*tables("interface", points=(k, 2), normal=(k, 2), **numbers))
-            fibres = tables("fibre", body=(f,), centre=(f, 2), radius=(f,), strength=(f,))
-            size = np.array([file.attrs["width"], file.attrs["height"]], float)
-            phases = tuple(map(str, file.attrs["phases"]))
-            document = Section(_document(directory / JSON))
-            files = ResultFiles(document, size, phases, mesh, interface, Fibres(*fibres), file, changed)
-            for name, table, low, high in (
-                ("/mesh/triangles names unknown nodes", mesh.triangles, 0, n),
-                ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
-                ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(files.interfaces), 1)),
-                ("/interface/fibre_number names unknown fibres", interface.fibre, 1, f + 1),
-            ):
-                _expect(bool(((table >= low) & (table < high)).all()), name)
-            pairs = {name for section in files.interfaces for name in section.get("between", ())}
-            _expect(pairs <= set(phases), "the case has interfaces between unknown phases")
+    with h5py.File(path, "r") as file:
+        tables = {
+            "mesh": ("points", "triangles", "subdomain", "phase", "body"),
+            "interface": ("points", "normal", "length", "fibre_number", "fibre", "pair"),
+            "fibre": ("body", "centre", "radius", "strength"),
+        }
+        mesh, interface, fibres = ([file[f"{part}/{name}"][()] for name in names] for part, names in tables.items())
+        size = np.array([file.attrs["width"], file.attrs["height"]], float)
+        phases = tuple(map(str, file.attrs["phases"]))
+        parts = Mesh(*mesh), InterfaceRows(*interface), Fibres(*fibres), file, changed
+        files = ResultFiles(Section(_document(directory / JSON)), size, phases, *parts)
+        pairs = {name for section in files.interfaces for name in section.get("between", ())}
+        if not pairs <= set(phases):
+            raise CaseError(f"{path}: the case has interfaces between unknown phases")
         yield files
 
 
@@ -269,27 +246,3 @@ def _document(path: Path) -> Mapping[str, Any]:
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
         raise CaseError(f"{path}: no result of this version; expected schema {SCHEMA} and a case")
     return document
-
-
-def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...]) -> Any:
-    """Read a table with a `shape`."""
-    array = np.asarray(file[f"{group}/{name}"][()])
-    _expect(array.shape == shape, f"/{group}/{name} has shape {array.shape}, expected {shape}")
-    return array
-
-
-def _expect(holds: bool, fault: str) -> None:
-    if not holds:
-        raise ValueError(fault)
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """Convert exceptions by damaged or foreign files to CaseError with one line."""
-    try:
-        yield
-    except OSError as error:
-        raise input_files.unreadable(path, error) from error
-    except (AttributeError, RuntimeError, LookupError, ValueError, TypeError) as error:
-        message = error.args[0] if error.args else error
-        raise CaseError(f"cannot read {path}: {' '.join(str(message).split())}") from error

@@ -6,27 +6,28 @@ Exit code 1 if there are any.
 import argparse
 import sys
 import tempfile
-from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from support.jobs import mpirun
 
 from hostile import case_files, events, fibre_tables, fuzzer, meshes, processes, results
+from hostile.attempts import Outcome
 from hostile.running import in_one_job, in_processes, make
 
 # Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
 EVERY = {1: 1, 2: 5, 3: 11}
-CASES, SEED = 200, 1
+OF_ONE_RANK = (events.FALSE_KIND, case_files.LONG_KIND)  # which another number of ranks refuses, or which rank 0 reads
+CASES, SEED = 100, 1
 AT_ONCE = 2  # jobs, or processes: as many as the cores of a small machine
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the words of the command."""
     words = argparse.ArgumentParser(prog="python -m hostile", description=__doc__)
-    words.add_argument("--cases", type=int, default=CASES, help="how many files with random damage are read besides")
+    words.add_argument("--cases", type=int, default=CASES, help="how many inputs have random damage")
     words.add_argument("--seed", type=int, default=SEED, help="of these")
-    words.add_argument("--only", default="", metavar="WORDS", help="attempts that have these in `kind: name`, no files")
+    words.add_argument("--only", default="", metavar="WORDS", help="attempts that have these in `kind: name`")
     return words
 
 
@@ -44,8 +45,8 @@ def prepare(folder: Path) -> None:
         list(pool.map(run, results.PREPARED))
 
 
-def tried(folder: Path, only: str) -> dict[str, list[str]]:
-    """Return the faults of all attempts whose kind and name have these words."""
+def tried(folder: Path, only: str, cases: int, seed: int) -> dict[str, Outcome]:
+    """Return the outcomes of all attempts whose kind and name have these words, and of so many at random."""
     prepared = folder / "prepared"
     shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts()]
     shared += [*results.attempts(prepared), *events.attempts(prepared)]
@@ -54,7 +55,9 @@ def tried(folder: Path, only: str) -> dict[str, list[str]]:
     )
     jobs = []
     for ranks, step in EVERY.items():
-        tried_here = [a for a in shared[::step] if ranks == 1 or a.kind != events.FALSE_KIND]  # of one rank
+        tried_here = [a for a in shared[::step] if ranks == 1 or a.kind not in OF_ONE_RANK]
+        if ranks == 1:
+            tried_here += [a for a in fuzzer.attempts(prepared, cases, seed) if only in f"{a.kind}: {a.name}"]
         parts = (tried_here[k::AT_ONCE] for k in range(AT_ONCE)) if ranks == 1 else (tried_here,)
         jobs += [(part, ranks, folder / f"{ranks} ranks, {k}") for k, part in enumerate(parts) if part]
     for part, _, place in jobs:
@@ -62,7 +65,7 @@ def tried(folder: Path, only: str) -> dict[str, list[str]]:
     with ThreadPoolExecutor(AT_ONCE) as pool:
         in_jobs = [pool.submit(in_one_job, *job) for job in jobs]
         found = in_processes(alone, folder / "processes", pool)
-        return {name: faults for job in in_jobs for name, faults in job.result().items()} | found
+        return {name: outcome for job in in_jobs for name, outcome in job.result().items()} | found
 
 
 def main() -> int:
@@ -71,15 +74,16 @@ def main() -> int:
         folder = Path(name)
         folder.chmod(0o755)  # for other users
         prepare(folder / "prepared")
-        found, cases = tried(folder, given.only), 0 if given.only else given.cases
-        damaged = [*fuzzer.faults(folder / "prepared", folder / "random", cases, given.seed)]
-    for kind, count in Counter(name.partition(":")[0] for name in found).items():
-        print(f"{kind:20} {count:4}")
-    faulty = {name: faults for name, faults in found.items() if faults}
-    for line in [f"{name}: {'; '.join(faults)}" for name, faults in faulty.items()] + damaged:
-        print(line)
-    print(f"{len(found)} attempts, {len(faulty)} with faults; {cases} files at random, {len(damaged)} with faults")
-    return 1 if faulty or damaged else 0
+        found = tried(folder, given.only, given.cases, given.seed)
+    for kind in dict.fromkeys(name.partition(":")[0] for name in found):
+        of_kind = [outcome for name, outcome in found.items() if name.partition(":")[0] == kind]
+        seconds, mib = sum(outcome.seconds for outcome in of_kind), max(outcome.mib for outcome in of_kind)
+        print(f"{kind:20} {len(of_kind):4} {seconds:6.1f} s {mib:5} MiB")
+    faulty = {name: outcome.faults for name, outcome in found.items() if outcome.faults}
+    for name, faults in faulty.items():
+        print(f"{name}: {'; '.join(faults)}")
+    print(f"{len(found)} attempts, {len(faulty)} with faults")
+    return 1 if faulty else 0
 
 
 if __name__ == "__main__":

@@ -4,13 +4,23 @@ import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 Content = str | bytes | Callable[[Path], object]
 LIMIT_S = 60  # of the processor, of each attempt: what takes longer does not end
 PATIENCE_S = 10 * LIMIT_S  # of the clock, on a busy machine too: what takes longer waits for ever
 MOST_LINES = 21
+MOST_S, MOST_MIB = 10.0, 2048  # of the processor and of memory, in a job that tries one command after the other
 # How lines on standard error begin; mpirun's own are left out before.
 BEGINNINGS = ("error: ", "warning: ", "interrupted by ")
+
+
+class Outcome(NamedTuple):
+    """What is wrong with the end of an attempt, and the seconds of the processor and MiB that it took."""
+
+    faults: list[str]
+    seconds: float = 0.0
+    mib: int = 0
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,9 @@ class Attempt:
     def command(self, folder: Path) -> list[str]:
         return [word.replace("@", str(folder)) for word in self.words]
 
-    def faults(self, code: int | None, output: str, errors: str, written: set[Path]) -> list[str]:
+    def faults(
+        self, code: int | None, output: str, errors: str, written: set[Path], seconds: float = 0.0, mib: int = 0
+    ) -> list[str]:
         """List what is wrong with its end; code None is that of an attempt that was not done in time."""
         lines = [line for line in errors.splitlines() if line]
         checks = {
@@ -59,6 +71,7 @@ class Attempt:
             "a traceback": "Traceback" in errors,
             "a line that is no error": any(not line.startswith(BEGINNINGS) for line in lines),
             "characters that a terminal obeys": any(not line.isprintable() for line in (output + errors).split("\n")),
+            f"{seconds:.1f} s, {mib} MiB": seconds > MOST_S or mib > MOST_MIB,
             f"writes {sorted(map(str, written))[:3]}": bool(written),
         }
         return [words for words, holds in checks.items() if holds]

@@ -4,6 +4,7 @@ import json
 import os
 import zlib
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,15 @@ def in_events(change: Callable[[list[checkpoints.Arrays]], Any]) -> Callable[[Pa
     return make
 
 
+@cache
+def bomb() -> bytes:
+    """Return a gigabyte of zeros, compressed in parts."""
+    stream, part = zlib.compressobj(1), bytes(1 << 24)
+    return b"".join(stream.compress(part) for _ in range(64)) + stream.flush()
+
+
 EVENTS: dict[str, Callable[[Path], None]] = {
-    "a gigabyte of zeros": in_events(lambda events: [*events, zlib.compress(bytes(1 << 30), 1)]),
+    "a gigabyte of zeros": in_events(lambda events: [*events, bomb()]),
     "zeros": in_events(lambda events: [*events, zlib.compress(bytes(1000))]),
     "no compression": in_events(lambda events: [*events, b"[]"]),
     "an array of objects": in_events(lambda events: [*events, zlib.compress(b'[["a", "O", [1]]]\n12345678')]),

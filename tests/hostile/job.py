@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import resource
 import signal
 import sys
 from pathlib import Path
@@ -17,8 +19,28 @@ def limit(processor: float, clock: float) -> None:
     signal.setitimer(signal.ITIMER_REAL, clock)
 
 
+def used() -> float:
+    """Return the seconds of the processor so far, of this process and of the children that it has waited for."""
+    return sum(os.times()[:4])
+
+
+def peak() -> int:
+    """Return the largest memory in MiB, of this process since `begin` and of any child so far."""
+    own = re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())
+    assert own
+    return max(int(own[1]), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) >> 10
+
+
+def begin() -> float:
+    """Forget the largest memory so far, and return `used`."""
+    Path("/proc/self/clear_refs").write_text("5")
+    return used()
+
+
 def main(commands: Path, processor: float, clock: float) -> None:
-    """Run the commands in a file; rank 0 writes output, errors and exit code of number K beside it: K.1, K.2, K.code.
+    """Run the commands in a file; rank 0 writes output, errors and end of number K beside it: K.1, K.2, K.code.
+
+    The end is the exit code, the seconds of the processor and the largest memory.
 
     What other ranks print, whose errors are of their own, goes to K.2 too.
     """
@@ -28,6 +50,7 @@ def main(commands: Path, processor: float, clock: float) -> None:
             os.dup2(end, stream)
             os.close(end)
         limit(processor, clock)
+        start = begin()
         try:
             code = cli.main(words)
         except SystemExit as end_of_help:
@@ -36,7 +59,7 @@ def main(commands: Path, processor: float, clock: float) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         if MPI.COMM_WORLD.rank == 0:
-            Path(f"{commands}.{number}.code").write_text(str(code))
+            Path(f"{commands}.{number}.code").write_text(f"{code} {used() - start:.3f} {peak()}")
 
 
 if __name__ == "__main__":

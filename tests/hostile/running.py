@@ -12,7 +12,7 @@ from pathlib import Path
 import matplotlib as mpl
 from support.jobs import ROOT, environment, mpirun
 
-from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, entries
+from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, Outcome, entries
 
 MOST_TOLD = 1500  # characters of what a faulty attempt printed
 
@@ -24,8 +24,8 @@ def make(attempts: Sequence[Attempt], folder: Path) -> None:
         attempt.make(folder / str(number))
 
 
-def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[str, list[str]]:
-    """Return the faults of made attempts, one after the other on so many ranks, up to one that ends the job."""
+def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[str, Outcome]:
+    """Return the outcomes of made attempts, one after the other on so many ranks, up to one that ends the job."""
     here = folder / "cwd"
     places = [folder / str(number) for number in range(len(attempts))]
     before = [entries(place) for place in places]
@@ -36,20 +36,23 @@ def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[st
     found = {}
     for number, (attempt, place) in enumerate(zip(attempts, places, strict=True)):
         answers = [Path(f"{commands}.{number}.{end}") for end in ("code", "1", "2")]
-        code, output, errors = (path.read_text(errors="replace") if path.exists() else "" for path in answers)
+        end, output, errors = (path.read_text(errors="replace") if path.exists() else "" for path in answers)
+        code, seconds, mib = end.split() or ("", "0", "0")
         written = (entries(place) - before[number]) | set(here.iterdir())
         name = f"{attempt.kind}: {attempt.name}, {ranks} ranks"
-        found[name] = attempt.faults(int(code) if code else None, output, errors, written)
-        if found[name]:
-            found[name].append(f"{output[:300]}{errors[-MOST_TOLD:]}")
+        used = float(seconds), int(mib)
+        faults = attempt.faults(int(code) if code else None, output, errors, written, *used)
+        found[name] = Outcome(faults, *used)
+        if faults:
+            faults.append(f"{output[:300]}{errors[-MOST_TOLD:]}")
         if not code:
-            found[name].append(f"the job ended: {job.stderr[-300:]}")
+            faults.append(f"the job ended: {job.stderr[-300:]}")
             break
     return found
 
 
-def in_processes(attempts: Sequence[Attempt], folder: Path, pool: Executor) -> dict[str, list[str]]:
-    """Return the faults of attempts in processes of their own, which the threads of a pool start."""
+def in_processes(attempts: Sequence[Attempt], folder: Path, pool: Executor) -> dict[str, Outcome]:
+    """Return the outcomes of attempts in processes of their own, which the threads of a pool start."""
     for name in ("bin", "home"):
         (folder / name).mkdir(parents=True)
         (folder / name).chmod(0o777)
@@ -59,7 +62,7 @@ def in_processes(attempts: Sequence[Attempt], folder: Path, pool: Executor) -> d
     program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m feti_homog "$@"\n')
     program.chmod(0o755)
     found = pool.map(lambda pair: _in_process(pair[1], folder / str(pair[0])), enumerate(attempts))
-    return {f"{a.kind}: {a.name}": faults for a, faults in zip(attempts, found, strict=True)}
+    return {f"{a.kind}: {a.name}": Outcome(faults) for a, faults in zip(attempts, found, strict=True)}
 
 
 def _in_process(attempt: Attempt, place: Path) -> list[str]:

@@ -106,7 +106,7 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     append = atomic.append
 
     def third_is_full(path, *arguments, **kind):
-        with atomic.write_errors(path):
+        with atomic.file_errors("write", path):
             if name == "events" and events.count(out) == 2:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         append(path, *arguments, **kind)

@@ -14,7 +14,8 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs, messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries.
+# begun runs, messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries,
+# and of results the ranges of numbers that verify compared before.
 LINES = {
     ".": 470,
     "analysis": 3000 + 115 + 125,
@@ -28,11 +29,11 @@ LINES = {
     "mesh": 5500 + 0 + 255,
     "microstructure": 2140 + 0 + 25,
     "report": 3420 + 150 + 124,
-    "results": 2430 + 110,
+    "results": 2430 + 110 + 40,
     "schema": 430 + 0 + 5,
-    "studies": 2950 + 55,
+    "studies": 2950 + 55 + 4,
     "system": 1770 + 8,
-    "verify": 3100 + 150 + 120,
+    "verify": 3100 + 150 + 76,
 }
 FILES, TOTAL = 310, 45000 + 368 + 1132
 # Percent of all lines: private functions that are called once, and imports.

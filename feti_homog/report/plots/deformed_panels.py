@@ -128,7 +128,7 @@ def draw_state(
     Raises:
         FetiHomogError: result.h5 cannot be read, or has no such state.
     """
-    field_guard.require_own(path := Path(out) / field_file.NAME)
+    field_guard.require_own(path := Path(out) / field_file.NAME, number)
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)

@@ -110,3 +110,9 @@ def test_stages_within_a_stage_have_times_of_their_own(monkeypatch):
         pass
     monkeypatch.undo()
     assert progress.seconds == {"fields": 3.0, "solve": 7.0}
+
+
+def test_a_start_at_a_tiny_load_has_a_forecast():
+    assert shown_lines([1e-99], 60.0) == [
+        "  load 0%, 0:01:00 used, 11574 days, 1:46:40 left, 1 events, 1.0 a minute",
+    ]
