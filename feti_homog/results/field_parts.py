@@ -12,7 +12,7 @@ from feti_homog.fem import GENERALIZED
 from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
 from feti_homog.materials import laws, voigt
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
-from feti_homog.typing import Float, Float32
+from feti_homog.typing import Float
 
 
 def header(cell: unit_cell.TornCell) -> Header:

@@ -237,5 +237,5 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
         return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
     values, load = values[rising], load[rising]
     start = np.append(0.0, load[:-1] / load[1:])
-    steps = start[:, None] + (1.0 - start[:, None]) * STEPS
-    return np.asarray(values[:, None] * steps**power).ravel()
+    shares = start[:, None] + (1.0 - start[:, None]) * STEPS
+    return np.asarray(values[:, None] * shares**power).ravel()
