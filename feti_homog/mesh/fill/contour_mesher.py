@@ -20,6 +20,7 @@ from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, NEAREST, PASSAGE_EDGE, SizeField
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
+from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int32
 
 
@@ -43,7 +44,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     away = np.abs(indicator - level)
     across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
     i = int(np.argmax(across[0]))
-    j = int(np.argmax(np.minimum(across[1], away[:, i])))
+    # No corner of the cell lies in a void.
+    is_void = phase[:, i] == (*phases, phase_names.VOID).index(phase_names.VOID)
+    j = int(np.argmax(np.where(is_void, -1.0, np.minimum(across[1], away[:, i]))))
     indicator, phase = (np.roll(array, (-j, -i), (0, 1)) for array in (indicator, phase))
     rows, width = phase.shape
     curves = [*map(_resampled, measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
@@ -113,7 +116,7 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 
 
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
-    """Give each surface the phase that prevails among its elements.
+    """Give each surface the phase that prevails among its elements, and empty voids.
 
     Edges that turn by more than 87 degrees, with a rise of 0.2 lengths, become straight.
     """
@@ -129,7 +132,9 @@ def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> 
     surfaces, which = np.unique(entity, return_inverse=True)
     votes = np.zeros((len(surfaces), len(phases)), np.int64)
     np.add.at(votes, (which, phase[row % phase.shape[0], column % phase.shape[1]]), 1)
-    numbers = zip(surfaces.tolist(), (votes.argmax(axis=1) + 1).tolist(), strict=True)
+    phase_of = votes.argmax(axis=1)
+    solid = np.flatnonzero(phase_of[which] != (*phases, phase_names.VOID).index(phase_names.VOID))
+    numbers = zip(surfaces.tolist(), (phase_of + 1).tolist(), strict=True)
     groups: dict[tuple[int, int], tuple[int, ...]] = {(2, surface): (number,) for surface, number in numbers}
     names = {(2, k + 1): name for k, name in enumerate(phases)}
-    return MshContent(content.tags, points, {"Triangle 6": (tags, nodes, entity)}, groups, names)
+    return MshContent(content.tags, points, {"Triangle 6": (tags[solid], nodes[solid], entity[solid])}, groups, names)

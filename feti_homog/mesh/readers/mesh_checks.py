@@ -6,14 +6,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
+from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Distance / cell size below which two nodes coincide: files may round coordinates.
-SAME_PLACE = 1e-7
 # Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
 MOST_PAIRS = 1000
 # Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.

@@ -11,7 +11,16 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from feti_homog.case import cell_section
 from feti_homog.errors import MeshError, escaped
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
+from feti_homog.mesh.coarse_mesh import (
+    SAME_PLACE,
+    CoarseMesh,
+    areas,
+    can_debond,
+    edge_keys,
+    edges,
+    paired_sides,
+    representatives,
+)
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
@@ -89,7 +98,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     origin, size = raw.points[:, :2].min(axis=0), np.ptp(raw.points[:, :2], axis=0)
     plane = raw.points[:, :2] - origin
     for level in (np.zeros(2), size):
-        plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
+        plane = np.where(np.abs(plane - level) < SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     total, cell = abs(areas(plane, raw.triangles).sum()), size.prod()
