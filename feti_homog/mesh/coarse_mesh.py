@@ -1,7 +1,7 @@
 """The coarse periodic mesh of a rectangular cell on rank 0, with interface edges and void edges."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -73,10 +73,10 @@ class CoarseMesh:
     phases: tuple[str, ...]
     precedence: Int32
     representative: Int32
-    ellipses: Ellipses
-    arc_edges: Int32
-    arc_circle: Int32
-    debonded_edges: Int32
+    ellipses: Ellipses = field(default_factory=lambda: Ellipses.round(np.zeros((0, 3))))
+    arc_edges: Int32 = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    arc_circle: Int32 = field(default_factory=lambda: np.zeros(0, np.int32))
+    debonded_edges: Int32 = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     snapped: float = 0.0
     origin: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()

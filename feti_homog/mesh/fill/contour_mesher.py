@@ -49,7 +49,13 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     j = int(np.argmax(np.where(is_void, -1.0, np.minimum(across[1], away[:, i]))))
     indicator, phase = (np.roll(array, (-j, -i), (0, 1)) for array in (indicator, phase))
     rows, width = phase.shape
-    curves = [*map(_resampled, measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
+    curves = []
+    for contour in measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level):
+        # Points about two pixels apart, both ends included.
+        length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
+        places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
+        curves.append(np.column_stack([np.interp(places, length, x) for x in contour.T]))
+        curves[-1][[0, -1]] = contour[[0, -1]]
     size = np.array([1.0, rows / width])
     field = _size_field(curves, indicator, cell.mesh_size, size)
     refuse_many(field, field.least, size)
@@ -83,15 +89,6 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
         names = f"{phases[a[k]]} and {phases[b[k]]} touch beside a third phase"
         raise MeshError(f"[cell] smooth = true: {names}; expected two phases at an outline, as of fibres in coatings")
     return np.asarray(is_odd[phase])
-
-
-def _resampled(contour: Float) -> Float:
-    """Place points (k, 2) evenly on a contour, about two pixels apart, both ends included."""
-    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
-    places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
-    points = np.column_stack([np.interp(places, length, x) for x in contour.T])
-    points[[0, -1]] = contour[[0, -1]]
-    return points
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:

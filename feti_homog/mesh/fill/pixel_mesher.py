@@ -19,11 +19,12 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     Each pixel is cut in two triangles, as `raw_mesh.in_triangles` cuts a grid of quadrilaterals.
 
     Raises:
-        CaseError, MeshError: as `msh_reader.read_cell`, `label_image.read_labels` and `contour_mesher.mesh_contours`.
+        CaseError, MeshError: as `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`.
     """
-    if cell.geometry == "mesh":
-        return msh_reader.read_cell(cell)
     assert cell.file is not None
+    if cell.geometry == "mesh":
+        snap = cell.snap_tolerance if cell.repair == "snap" else None
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh

@@ -140,11 +140,8 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 
     `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
     """
-    pairs = edges(mesh.triangles)
-    _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
-    single = pairs[first[number == 1]]
-    ends = plane[single]
-    inner = single[~on_sides(ends, size)]
+    single = mesh.border
+    inner = single[~on_sides(plane[single], size)]
     if len(inner) == 0:
         return []
     nodes = np.unique(inner)
