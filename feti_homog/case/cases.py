@@ -197,7 +197,8 @@ class Case:
         return short_digest(json.dumps(document, sort_keys=True).encode() + content)
 
 
-load, parse = Case.load, Case.parse
+load = Case.load
+parse = Case.parse
 
 
 def check_stored(values: Mapping[str, Any]) -> None:

@@ -18,6 +18,8 @@ pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtur
 
 # In pieces, of which several ranks have interface nodes.
 SPRUNG = {"interface": SPRINGS, "decomposition": {"subdomains": 40}}
+LEAKY = {"interface": {"conductance": 3.0, "debonded": []}, "decomposition": {"subdomains": 40}}
+CONDUCTORS = {"matrix": {"conductivity": 0.2}, "fibre": {"conductivity": 1.1}}
 
 
 def solved(comm, path, cell=None, **sections):
@@ -93,6 +95,25 @@ def test_voids_are_holes_in_a_mesh_of_quadrilaterals(comm, shared_path, sections
     assert np.abs(C - other).max() < 1e-11 * other.max()
     assert result.cell.fractions == pytest.approx(expected.cell.fractions, rel=1e-12)
     assert sum(result.cell.fractions.values()) == pytest.approx(1 - 10 / 144)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "displacement", "traction"])
+@pytest.mark.parametrize("sections", [{}, LEAKY], ids=["bonded", "conductances"])
+def test_pixels_conduct_as_the_same_quadrilaterals(comm, shared_path, sections, boundary):
+    """With voids, which insulate."""
+    sections = sections | {"material": CONDUCTORS, "analysis": {"type": "conductivity"}}
+    result = with_voids(comm, shared_path, HOLES, boundary, **sections)
+    if comm.rank == 0:
+        written(quadrilaterals(HOLES), shared_path / "quads.inp")
+        certificate = verify(shared_path / "out")
+        assert certificate.holds, certificate.text
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp"), "voids": True, "boundary": boundary}
+    expected = compute(Case.parse(RUN | {"cell": cell} | sections), comm)
+    k, other = result.effective_conductivity, expected.effective_conductivity
+    assert np.abs(k - other).max() < 1e-11 * other.max()
+    alone = compute(Case.parse(result.case), MPI.COMM_SELF).effective_conductivity
+    assert np.abs(k - alone).max() < 1e-10 * other.max()
 
 
 @pytest.mark.parametrize("sections", [{}, SPRUNG], ids=["bonded", "springs"])
