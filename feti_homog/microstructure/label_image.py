@@ -38,7 +38,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
         few = ", ".join(unnamed[:3]) + ", ..." * (len(unnamed) > 3)
         way = ""
         if len(unnamed) > 16:
-            way = "; of grey values, as at smoothed edges, make labels by a threshold, or fibres --image a table"
+            way = "; of grey values or numbers of fibres make labels by a threshold, or fibres --image a table"
         faults.append(f"[cell] labels: no phase of {few}; {listed}{way}")
     for name in sorted(labels.keys() - {*names}):
         faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
