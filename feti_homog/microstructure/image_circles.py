@@ -67,8 +67,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
         if not len(circles):
             return 0.0, circles
         distance, nearest = cKDTree(circles[:, :2]).query(edges, range(1, min(6, len(circles)) + 1))
-        faces = np.einsum("nki,ni->nk", circles[nearest, :2] - edges[:, None], inward) > 0.8 * distance
-        error = np.where(faces, np.abs(distance / circles[nearest, 2] - 1), np.inf)
+        error = np.abs(distance / circles[nearest, 2] - 1)
         place, best = np.arange(len(edges)), error.argmin(axis=1)
         owner, error = nearest[place, best], error[place, best]
         is_on = error < np.maximum(reach, 1.0 / circles[owner, 2])
