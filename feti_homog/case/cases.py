@@ -59,13 +59,30 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Load a case from a file, as the function `load`."""
-        return load(path)
+        """Load a case from a file, whose name is the default case name.  Raises CaseError with all faults."""
+        return cls.parse(read_document(path), Path(path).parent)
 
     @classmethod
-    def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """Build a case from nested dictionaries, as the function `parse`."""
-        return parse(document, Path(folder))
+    def parse(cls, values: Mapping[str, Any], folder: str | Path = ".") -> Case:
+        """Build a case from nested dictionaries, with file names relative to `folder`.
+
+        Values may be NumPy scalars, arrays, tuples and paths, besides TOML types.
+
+        Raises:
+            CaseError: with all faults.
+            TypeError: `values` is not a mapping.
+        """
+        document, folder = to_document(values), Path(folder)
+        contents, faults = _read_sections(document, folder)
+        if not faults:
+            faults += laws.contrast_lines(contents["materials"], contents["analysis"].plane)[0]
+        if not faults:
+            cell, materials = contents["cell"], contents["materials"]
+            plane, free_faces = contents["analysis"].plane, bool(contents["interfaces"]) or cell.has_voids
+            contents["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
+        if faults:
+            raise CaseError(*faults)
+        return cls(name=document.get("name", "case"), source=(document, folder), **contents)
 
     def replace(self, changes: Mapping[str, Any]) -> Case:
         """Return the checked case with other values by dotted key, as `{"material.fibre.young": 80.0}`.
@@ -179,31 +196,8 @@ class Case:
         return short_digest(json.dumps(document, sort_keys=True).encode() + content)
 
 
-def load(path: str | Path) -> Case:
-    """Load a case from a file, whose name is the default case name.  Raises CaseError with all faults."""
-    return parse(read_document(path), Path(path).parent)
-
-
-def parse(values: Mapping[str, Any], folder: Path) -> Case:
-    """Build a case from nested dictionaries, with file names relative to `folder`.
-
-    Values may be NumPy scalars, arrays, tuples and paths, besides TOML types.
-
-    Raises:
-        CaseError: with all faults.
-        TypeError: `values` is not a mapping.
-    """
-    document = to_document(values)
-    contents, faults = _read_sections(document, folder)
-    if not faults:
-        faults += laws.contrast_lines(contents["materials"], contents["analysis"].plane)[0]
-    if not faults:
-        cell, materials = contents["cell"], contents["materials"]
-        plane, free_faces = contents["analysis"].plane, bool(contents["interfaces"]) or cell.has_voids
-        contents["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
-    if faults:
-        raise CaseError(*faults)
-    return Case(name=document.get("name", "case"), source=(document, folder), **contents)
+load = Case.load
+parse = Case.parse
 
 
 def check_stored(values: Mapping[str, Any]) -> None:

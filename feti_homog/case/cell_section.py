@@ -244,7 +244,7 @@ class Cell:
     )
     labels: Mapping[str, str] = key(
         kinds.LABELS,
-        'The phase of each number in an image, such as {0 = "matrix", 255 = "fibre"}.',
+        'The phase of each number in an image, such as {0 = "matrix", 255 = "fibre"}, or "void".',
         only=PIXELS,
     )
     pixel: float = key(types.real(least=1e-9, most=1e9), "Edge of a pixel.", unit="length", default=1.0, only=PIXELS)

@@ -72,7 +72,7 @@ LABELS = types.ValueType(
     lambda v: (
         isinstance(v, dict)
         and all(re.fullmatch("0|[1-9][0-9]{0,4}", k) and int(k) < 1 << 16 for k in v)
-        and all(isinstance(name, str) and phase_names.PHASE.fullmatch(name) for name in v.values())
+        and all(name == phase_names.VOID or phase_names.PHASE.fullmatch(str(name)) for name in v.values())
         and phase_names.MATRIX in v.values()
     ),
     dict,

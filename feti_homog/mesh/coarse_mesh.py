@@ -1,7 +1,7 @@
 """The coarse periodic mesh of a rectangular cell on rank 0, with interface edges and void edges."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,6 +9,9 @@ from scipy.sparse.csgraph import connected_components
 
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Index, Int, Int32
+
+# Distance / cell size below which two nodes coincide: files may round coordinates.
+SAME_PLACE = 1e-7
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
@@ -25,13 +28,16 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
     Yields:
         The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
-        period, both in ascending order along the side.
+        period, both in ascending order along the side.  Beside voids points without partners are left out.
     """
     for axis in (0, 1):
         along = points[:, 1 - axis]
         low, high = (np.flatnonzero(points[:, axis] == level) for level in (0.0, period[axis]))
-        if len(high):
-            yield axis, low[np.argsort(along[low])], high[np.argsort(along[high])]
+        low, high = (nodes[np.argsort(along[nodes])] for nodes in (low, high))
+        if len(low) != len(high) or not np.allclose(along[low], along[high], 0.0, SAME_PLACE * float(np.ptp(points))):
+            _, left, right = np.intersect1d(along[low], along[high], return_indices=True)
+            low, high = low[left], high[right]
+        yield axis, low, high
 
 
 @dataclass(frozen=True)
@@ -67,10 +73,10 @@ class CoarseMesh:
     phases: tuple[str, ...]
     precedence: Int32
     representative: Int32
-    ellipses: Ellipses
-    arc_edges: Int32
-    arc_circle: Int32
-    debonded_edges: Int32
+    ellipses: Ellipses = field(default_factory=lambda: Ellipses.round(np.zeros((0, 3))))
+    arc_edges: Int32 = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    arc_circle: Int32 = field(default_factory=lambda: np.zeros(0, np.int32))
+    debonded_edges: Int32 = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     snapped: float = 0.0
     origin: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
@@ -216,7 +222,7 @@ def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:
     """Move edges (k, 2) on the right or upper side to the opposite side."""
     for axis, low, high in paired_sides(mesh.points, mesh.shift):
-        partner = np.zeros(len(mesh.points), dtype=np.int32)
+        partner = np.arange(len(mesh.points), dtype=np.int32)
         partner[high] = low
         on_high = np.all(mesh.points[pairs, axis] == mesh.period[axis], axis=1)
         pairs = np.where(on_high[:, None], partner[pairs], pairs)

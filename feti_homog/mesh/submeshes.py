@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
+
+# The arrays of a submesh with a row for each triangle, vertex, plane edge, class and torus edge, but index arrays.
+ROWS = (
+    ("constituent", "backwards"),
+    ("points",),
+    ("circles", "turns"),
+    ("touching", "class_keys"),
+    ("at_void", "debonded", "edge_keys"),
+)
 
 
 @dataclass(frozen=True)
@@ -161,23 +171,15 @@ def part(submesh: Submesh, members: Int) -> Submesh:
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
     torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
+    rows = zip((members, vertices, edges, classes, torus_edges), ROWS, strict=True)
     return replace(
         submesh,
-        constituent=submesh.constituent[members],
-        points=submesh.points[vertices],
+        **{name: getattr(submesh, name)[some] for some, names in rows for name in names},
         triangles=triangles,
         triangle_edges=triangle_edges,
-        backwards=submesh.backwards[members],
         edges=np.searchsorted(vertices, submesh.edges[edges]),
-        circles=submesh.circles[edges],
-        turns=submesh.turns[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
-        at_void=submesh.at_void[torus_edges],
-        debonded=submesh.debonded[torus_edges],
-        touching=submesh.touching[classes],
-        class_keys=submesh.class_keys[classes],
-        edge_keys=submesh.edge_keys[torus_edges],
         pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),
     )
 
@@ -260,25 +262,17 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
     """Join submeshes; identify classes and torus edges, but no plane vertices and plane edges."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
-    edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
+    _, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = np.concatenate([mesh.class_keys[mesh.pinned] for mesh in meshes])
+    rows: tuple[Any, ...] = (..., ..., ..., first_class, first)
     return replace(
         meshes[0],
-        constituent=_all(meshes, "constituent"),
-        points=_all(meshes, "points"),
+        **{name: _all(meshes, name)[some] for some, names in zip(rows, ROWS, strict=True) for name in names},
         triangles=_numbers(meshes, "triangles", "points"),
         triangle_edges=_numbers(meshes, "triangle_edges", "edges"),
-        backwards=_all(meshes, "backwards"),
         edges=_numbers(meshes, "edges", "points"),
-        circles=_all(meshes, "circles"),
-        turns=_all(meshes, "turns"),
         vertex_class=class_of[_numbers(meshes, "vertex_class", "class_keys")],
         edge_class=edge_of[_numbers(meshes, "edge_class", "edge_keys")],
-        at_void=_all(meshes, "at_void")[first],
-        debonded=_all(meshes, "debonded")[first],
-        touching=_all(meshes, "touching")[first_class],
-        class_keys=class_keys,
-        edge_keys=edge_keys,
         pinned=np.flatnonzero(np.isin(class_keys, pinned)),
     )
 

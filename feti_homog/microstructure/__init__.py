@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from feti_homog.microstructure.arrangements import Arrangement
 
 __all__ = [
-    "Arrangement", "arrangements", "fibre_pattern", "fibre_table", "label_image", "periodic_table", "phase_names",
-    "random_fibres", "table_columns",
+    "Arrangement", "arrangements", "fibre_pattern", "fibre_table", "image_circles", "label_image", "periodic_table",
+    "phase_names", "random_fibres", "table_columns",
 ]  # fmt: skip
 
 

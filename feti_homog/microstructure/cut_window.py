@@ -5,7 +5,7 @@ from scipy.optimize import nnls
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.arrangements import neighbours
-from feti_homog.microstructure.shapes.outlines import Outlines
+from feti_homog.microstructure.shapes import Outlines
 from feti_homog.typing import Float
 
 # Least and largest ratio of gap to radius sum for fibres across the border.

@@ -14,7 +14,8 @@ import numpy as np
 from feti_homog.errors import MOST_FAULTS, CaseError
 from feti_homog.microstructure import table_columns
 from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
-from feti_homog.microstructure.shapes.outlines import Columns, Outlines
+from feti_homog.microstructure.shapes import Outlines
+from feti_homog.microstructure.shapes.outlines import Columns
 from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
 from feti_homog.schema import types, wording
 from feti_homog.typing import Bool, Float, Int

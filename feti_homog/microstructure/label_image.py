@@ -13,6 +13,8 @@ from feti_homog.schema import types, wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Array, Int32
 
+# Modes of Pillow with several numbers a pixel: how many are colours.
+COLOURS = {"LA": 1, "RGB": 3, "RGBA": 3}
 # Modes of Pillow with one whole number a pixel: bits, palettes, 8, 16 and 32 bits.
 WHOLE_NUMBERS = {"1", "P", "L", "I", "I;16", "I;16B", "I;16L", "I;16N"}
 
@@ -21,7 +23,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     """Read an image, and replace its labels by phases.
 
     Returns the phase numbers (rows, columns), the lowest row first, and the phase names, the matrix first, others in
-    order. `is_mirrored` puts the mirror images beside and above the image.
+    order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
         CaseError: the file is no image with whole numbers, or differs from `labels`, a line each.
@@ -34,12 +36,16 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     faults = []
     if unnamed := [name for name in names if name not in labels]:
         few = ", ".join(unnamed[:3]) + ", ..." * (len(unnamed) > 3)
-        faults.append(f"[cell] labels: no phase of {few}; {listed}")
+        way = ""
+        if len(unnamed) > 16:
+            way = "; of grey values or numbers of fibres make labels by a threshold, or fibres --image a table"
+        faults.append(f"[cell] labels: no phase of {few}; {listed}{way}")
     for name in sorted(labels.keys() - {*names}):
         faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
     if faults:
         raise CaseError(*faults)
-    phases = phase_names.MATRIX, *sorted({*labels.values()} - {phase_names.MATRIX})
+    ends = phase_names.MATRIX, phase_names.VOID
+    phases = tuple(sorted({*labels.values()}, key=lambda name: (name != ends[0], name == ends[1], name)))
     phase = np.array([phases.index(labels[name]) for name in names], np.int32)[np.searchsorted(numbers, image)]
     phase = phase[::-1]  # the first row of an image is the upper one
     if is_mirrored:
@@ -58,9 +64,12 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     """
     memory = 128 * types.MOST_PIXELS
     image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
+    if not is_grey and image.dtype.kind == "f" and np.array_equal(image, np.rint(image)):
+        image = image.astype(np.int64)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
-        shape = "x".join(map(str, image.shape))
-        raise CaseError(f"{path.name}: {shape} values of type {image.dtype}; expected a whole number a pixel, in rows")
+        shape, way = "x".join(map(str, image.shape)), "; cut one layer out of a stack" * (image.ndim > 2)
+        expected = f"expected a whole number a pixel, in rows{way}"
+        raise CaseError(f"{path.name}: {shape} values of type {image.dtype}; {expected}")
     _check_size(path, *image.shape)
     return image.astype(np.uint8) if image.dtype.kind == "b" else image
 
@@ -91,13 +100,17 @@ def _decoded(path: Path, is_grey: bool) -> Array:
                 raise CaseError(f"{path.name}: is no image, or damaged") from None
             _check_size(path, picture.height, picture.width)
             if (frames := getattr(picture, "n_frames", 1)) > 1:
-                raise CaseError(f"{path.name}: {frames} images; expected one")
+                raise CaseError(f"{path.name}: {frames} images; expected one; cut one layer out of a stack")
             if is_grey:
                 return np.array(picture if picture.mode in WHOLE_NUMBERS - {"P"} | {"F"} else picture.convert("L"))
-            if picture.mode not in WHOLE_NUMBERS:
-                expected = "expected one whole number a pixel, such as grey values of 8 bits"
-                raise CaseError(f"{path.name}: pixels of mode {picture.mode}; {expected}")
-            return np.array(picture)
+            pixels = np.array(picture)
+            if picture.mode in COLOURS:
+                opaque = pixels[..., -1] == 255 if picture.mode.endswith("A") else True
+                if (pixels[..., :1] == pixels[..., : COLOURS[picture.mode]]).all() and np.all(opaque):
+                    return pixels[..., 0]  # grey values, stored as colours
+                expected = "expected one whole number a pixel: save it with a palette or as grey values"
+                raise CaseError(f"{path.name}: pixels of mode {picture.mode} with colours or transparency; {expected}")
+            return pixels
     except FetiHomogError:
         raise
     except Exception as error:  # Pillow raises many kinds

@@ -18,6 +18,8 @@ pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtur
 
 # In pieces, of which several ranks have interface nodes.
 SPRUNG = {"interface": SPRINGS, "decomposition": {"subdomains": 40}}
+LEAKY = {"interface": {"conductance": 3.0, "debonded": []}, "decomposition": {"subdomains": 40}}
+CONDUCTORS = {"matrix": {"conductivity": 0.2}, "fibre": {"conductivity": 1.1}}
 
 
 def solved(comm, path, cell=None, **sections):
@@ -66,6 +68,89 @@ def test_rows_of_pixels_are_a_laminate(comm, shared_path, pixel):
     C = solved(comm, path, {"pixel": pixel}).effective_stiffness
     expected = laminate([plane_strain(phase) for phase in (MATRIX, FIBRE)], [5 / 8, 3 / 8], across=1)
     assert np.abs(C - expected).max() < 1e-11 * C.max()
+
+
+def with_voids(comm, folder, image, boundary="periodic", **sections):
+    """Return the result of an image, -1 in voids, and write its files. Collective."""
+    path = saved(comm, folder / "image.npy", image[::-1] % 3)
+    labels = {"0": "matrix", "1": "fibre", "2": "void"}
+    document = {"geometry": "pixels", "file": str(path), "labels": labels, "boundary": boundary, "pixel": 1 / 12}
+    return run(Case.parse(RUN | {"cell": document} | sections), comm, out=folder / "out")
+
+
+HOLES = np.zeros((12, 12), int)
+HOLES[2:5, 3:7], HOLES[8:11, 8:11], HOLES[6:9, 3:5], HOLES[2:4, 9:11] = 1, 1, -1, -1
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "displacement", "traction"])
+@pytest.mark.parametrize("sections", [{}, SPRUNG], ids=["bonded", "springs"])
+def test_voids_are_holes_in_a_mesh_of_quadrilaterals(comm, shared_path, sections, boundary):
+    result = with_voids(comm, shared_path, HOLES, boundary, **sections)
+    if comm.rank == 0:
+        written(quadrilaterals(HOLES), shared_path / "quads.inp")
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp"), "voids": True, "boundary": boundary}
+    expected = compute(Case.parse(RUN | {"cell": cell} | sections), comm)
+    C, other = result.effective_stiffness, expected.effective_stiffness
+    assert np.abs(C - other).max() < 1e-11 * other.max()
+    assert result.cell.fractions == pytest.approx(expected.cell.fractions, rel=1e-12)
+    assert sum(result.cell.fractions.values()) == pytest.approx(1 - 10 / 144)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "displacement", "traction"])
+@pytest.mark.parametrize("sections", [{}, LEAKY], ids=["bonded", "conductances"])
+def test_pixels_conduct_as_the_same_quadrilaterals(comm, shared_path, sections, boundary):
+    """With voids, which insulate."""
+    sections = sections | {"material": CONDUCTORS, "analysis": {"type": "conductivity"}}
+    result = with_voids(comm, shared_path, HOLES, boundary, **sections)
+    if comm.rank == 0:
+        written(quadrilaterals(HOLES), shared_path / "quads.inp")
+        certificate = verify(shared_path / "out")
+        assert certificate.holds, certificate.text
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": str(shared_path / "quads.inp"), "voids": True, "boundary": boundary}
+    expected = compute(Case.parse(RUN | {"cell": cell} | sections), comm)
+    k, other = result.effective_conductivity, expected.effective_conductivity
+    assert np.abs(k - other).max() < 1e-11 * other.max()
+    alone = compute(Case.parse(result.case), MPI.COMM_SELF).effective_conductivity
+    assert np.abs(k - alone).max() < 1e-10 * other.max()
+
+
+@pytest.mark.parametrize("sections", [{}, SPRUNG], ids=["bonded", "springs"])
+@pytest.mark.parametrize("touching", [False, True])
+def test_voids_on_the_sides_and_voids_that_touch(comm, shared_path, touching, sections):
+    """A periodic image may begin anywhere: steps by an even number of pixels keep the diagonals."""
+    image = HOLES.copy()
+    if touching:
+        image[5, 5] = image[9, 5] = image[4, 2] = -1
+    expected = with_voids(comm, shared_path, image, **sections).effective_stiffness
+    moved = np.roll(image, (4, 2), (0, 1))
+    assert all((side < 0).any() for side in (moved[0], moved[-1], moved[:, 0], moved[:, -1]))
+    found = with_voids(comm, shared_path, moved, **sections).effective_stiffness
+    assert np.abs(found - expected).max() < 1e-11 * expected.max()
+    if comm.rank == 0:
+        certificate = verify(shared_path / "out")
+        assert certificate.holds, certificate.text
+    comm.barrier()
+
+
+def test_drawn_voids_are_those_of_the_table(comm, shared_path):
+    """One across a side and one across the corners."""
+    circles = np.array([(0.95, 0.4, 0.16), (0.02, 0.98, 0.13), (0.4, 0.3, 0.15), (0.55, 0.7, 0.14)])
+    if comm.rank == 0:
+        image = labels_of(circles[:2], 150) // 255 * 2 + labels_of(circles[2:], 150) // 255
+        write_png(shared_path / "circles.png", image)
+    comm.barrier()
+    order = {"order": 2, "mesh_size": 0.05}
+    names = ["void", "void", "fibre", "fibre"]
+    rows = [{"x": x, "y": y, "radius": r, "phase": k} for (x, y, r), k in zip(circles.tolist(), names, strict=True)]
+    cell = {"geometry": "table", "fibre_list": rows, "width": 1.0, "height": 1.0, **order}
+    expected = compute(Case.parse(RUN | {"cell": cell}), comm).effective_stiffness
+    for more, error in (({"smooth": True, **order}, 2e-3), ({}, 1e-2)):
+        labels = {"0": "matrix", "1": "fibre", "2": "void"}
+        result = solved(comm, shared_path / "circles.png", {"labels": labels, "pixel": 1 / 150, **more})
+        assert np.abs(result.effective_stiffness - expected).max() < error * expected.max()
+        assert result.cell.fractions["fibre"] == pytest.approx(np.pi * (circles[2:, 2] ** 2).sum(), rel=1e-2)
 
 
 def test_first_row_of_an_image_is_the_upper_one_and_mirrors_make_it_whole(comm, shared_path):

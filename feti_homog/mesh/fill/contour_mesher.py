@@ -20,6 +20,7 @@ from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, NE
 from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
+from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int32
 
 
@@ -43,10 +44,18 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     away = np.abs(indicator - level)
     across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
     i = int(np.argmax(across[0]))
-    j = int(np.argmax(np.minimum(across[1], away[:, i])))
+    # No corner of the cell lies in a void.
+    is_void = phase[:, i] == (*phases, phase_names.VOID).index(phase_names.VOID)
+    j = int(np.argmax(np.where(is_void, -1.0, np.minimum(across[1], away[:, i]))))
     indicator, phase = (np.roll(array, (-j, -i), (0, 1)) for array in (indicator, phase))
     rows, width = phase.shape
-    curves = [*map(_resampled, measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level))]
+    curves = []
+    for contour in measure.find_contours(np.pad(indicator, ((0, 1), (0, 1)), mode="wrap"), level):
+        # Points about two pixels apart, both ends included.
+        length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
+        places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
+        curves.append(np.column_stack([np.interp(places, length, x) for x in contour.T]))
+        curves[-1][[0, -1]] = contour[[0, -1]]
     size = np.array([1.0, rows / width])
     field = _size_field(curves, indicator, cell.mesh_size, size)
     refuse_many(field, field.least, size)
@@ -82,15 +91,6 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
     return np.asarray(is_odd[phase])
 
 
-def _resampled(contour: Float) -> Float:
-    """Place points (k, 2) evenly on a contour, about two pixels apart, both ends included."""
-    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
-    places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
-    points = np.column_stack([np.interp(places, length, x) for x in contour.T])
-    points[[0, -1]] = contour[[0, -1]]
-    return points
-
-
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
     """Return the size field: small curves have MIN_EDGES_AROUND edges, or half as many if a side cuts them.
 
@@ -113,7 +113,7 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 
 
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
-    """Give each surface the phase that prevails among its elements.
+    """Give each surface the phase that prevails among its elements, and empty voids.
 
     Edges that turn by more than 87 degrees, with a rise of 0.2 lengths, become straight.
     """
@@ -129,7 +129,9 @@ def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> 
     surfaces, which = np.unique(entity, return_inverse=True)
     votes = np.zeros((len(surfaces), len(phases)), np.int64)
     np.add.at(votes, (which, phase[row % phase.shape[0], column % phase.shape[1]]), 1)
-    numbers = zip(surfaces.tolist(), (votes.argmax(axis=1) + 1).tolist(), strict=True)
+    phase_of = votes.argmax(axis=1)
+    solid = np.flatnonzero(phase_of[which] != (*phases, phase_names.VOID).index(phase_names.VOID))
+    numbers = zip(surfaces.tolist(), (phase_of + 1).tolist(), strict=True)
     groups: dict[tuple[int, int], tuple[int, ...]] = {(2, surface): (number,) for surface, number in numbers}
     names = {(2, k + 1): name for k, name in enumerate(phases)}
-    return MshContent(content.tags, points, {"Triangle 6": (tags, nodes, entity)}, groups, names)
+    return MshContent(content.tags, points, {"Triangle 6": (tags[solid], nodes[solid], entity[solid])}, groups, names)

@@ -75,10 +75,6 @@ class MshContent:
         names = {group: model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
         return cls(tags.astype(np.int64), points.reshape(-1, 3), elements, groups, names)
 
-    def name(self, dimension: int, group: int) -> str:
-        """Return the name of a physical group, or "number k" without a name."""
-        return self.names.get((dimension, group)) or f"number {group}"
-
 
 def load(path: Path) -> RawMesh:
     """Read a .msh file, and check only element types and numbers.
@@ -216,7 +212,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     curves = dict.fromkeys(named & {DEBONDED}, none)  # refused below if it has no lines
     members = {(group, number) for (d, number), some in content.groups.items() if d == 1 for group in some}
     for group, number in sorted(members):
-        name = content.name(1, group)
+        name = content.names.get((1, group)) or f"number {group}"
         ends = [nodes[entity == number, :2] for _, nodes, entity in lines]
         curves[name] = np.concatenate([curves.get(name, none), *ends])
     if not len(curves.get(DEBONDED, (0,))):
@@ -226,6 +222,6 @@ def raw_mesh(content: MshContent) -> RawMesh:
         entities = np.unique(entity)
         blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
         groups += [content.groups.get((2, number), ()) for number in entities.tolist()]
-    names = [tuple(content.name(2, number) for number in group) for group in groups]
     aliases = [tuple(map("number {}".format, group)) for group in groups]
+    names = [tuple(content.names.get((2, number)) or f"number {number}" for number in group) for group in groups]
     return assembled(content.tags, content.points, blocks, names, curves, aliases=aliases)

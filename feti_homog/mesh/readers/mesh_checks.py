@@ -6,14 +6,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
+from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Distance / cell size below which two nodes coincide: files may round coordinates.
-SAME_PLACE = 1e-7
 # Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
 MOST_PAIRS = 1000
 # Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.
@@ -142,11 +140,8 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 
     `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
     """
-    pairs = edges(mesh.triangles)
-    _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
-    single = pairs[first[number == 1]]
-    ends = plane[single]
-    inner = single[~on_sides(ends, size)]
+    single = mesh.border
+    inner = single[~on_sides(plane[single], size)]
     if len(inner) == 0:
         return []
     nodes = np.unique(inner)

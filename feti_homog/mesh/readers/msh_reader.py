@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from feti_homog.case import cell_section
 from feti_homog.errors import MeshError, escaped
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
+from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, can_debond, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
 from feti_homog.microstructure import phase_names
-from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.schema import wording
 from feti_homog.typing import Float, Int32
 
@@ -36,13 +34,6 @@ Selectors = Mapping[str, tuple[str | int, ...]]
 STRAIGHT = 1e-5
 # Slope up to which sides count as upright; fraction of the hull that a cell with voids fills at least.
 UPRIGHT, FILLED = 1e-2, 0.4
-
-
-def read_cell(cell: cell_section.Cell) -> CoarseMesh:
-    """Read the mesh file of a cell, with the repair that the case selects. Raises as `read`."""
-    assert cell.file is not None
-    snap = cell.snap_tolerance if cell.repair == "snap" else None
-    return read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary)
 
 
 def read(
@@ -89,7 +80,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     origin, size = raw.points[:, :2].min(axis=0), np.ptp(raw.points[:, :2], axis=0)
     plane = raw.points[:, :2] - origin
     for level in (np.zeros(2), size):
-        plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
+        plane = np.where(np.abs(plane - level) < SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     total, cell = abs(areas(plane, raw.triangles).sum()), size.prod()
@@ -111,9 +102,6 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
         phases=phases,
         precedence=phase,
         representative=representatives(plane, *shift),
-        ellipses=Ellipses.round(np.zeros((0, 3))),
-        arc_edges=np.zeros((0, 2), np.int32),
-        arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
         origin=(float(origin[0]), float(origin[1])),
         boundary=boundary,
@@ -143,9 +131,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     beyond the tolerance stay, and the checks report such nodes.
     """
     plane = raw.points[:, :2].copy()
-    pairs = edges(raw.triangles)
-    _, first, count = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
-    outer = np.asarray(np.unique(pairs[first[count == 1]]), np.int64)
+    outer = np.unique(raw.border)
     if not np.isfinite(plane).all() or not len(outer):
         return raw, 0.0
     reach = tolerance * float(np.ptp(plane[:, 0]))

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import edge_keys
+from feti_homog.mesh.coarse_mesh import edge_keys, edges
 from feti_homog.typing import Float, Int, Int32
 
 # The physical curve of edges that are debonded from the start.
@@ -75,6 +75,13 @@ class RawMesh:
         """The end node tags (d, 2) of the lines in the curve DEBONDED."""
         return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
+    @property
+    def border(self) -> Int32:
+        """The edges (k, 2) of only one triangle."""
+        pairs = edges(self.triangles)
+        _, first, count = np.unique(edge_keys(pairs, len(self.points)), return_index=True, return_counts=True)
+        return np.asarray(pairs[first[count == 1]])
+
     def node(self, number: int) -> str:
         """Describe a node in words."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
@@ -134,13 +141,13 @@ def assembled(
     """
     order = np.argsort(node_tags)
     points, tags = points[order], node_tags[order]
-    edges, middles = [np.zeros((0, 2), np.int64)], [np.zeros(0, np.int64)]
+    sides, middles = [np.zeros((0, 2), np.int64)], [np.zeros(0, np.int64)]
     triangles, quads = list[tuple[Int, Int, Int]](), list[tuple[Int, Int, Int]]()
     for block in blocks:
         count = 3 if block.nodes.shape[1] in (3, 6) else 4
         corners, bent = block.nodes[:, :count], block.nodes[:, count : 2 * count]
         if bent.size:
-            edges.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
+            sides.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
             middles.append(bent.ravel())
         (triangles if count == 3 else quads).append((block.tags, corners, block.group))
     if quads:
@@ -159,7 +166,7 @@ def assembled(
         groups=tuple(groups),
         curves=curves,
         middles=MiddleNodes(
-            edges=np.searchsorted(used, np.concatenate(edges)).astype(np.int32),
+            edges=np.searchsorted(used, np.concatenate(sides)).astype(np.int32),
             tags=middle,
             points=points[np.searchsorted(tags, middle)],
         ),

@@ -38,7 +38,13 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     pairs = interface_edges(mesh)
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
-        circle = _fit_circle(places)
+        # The circle |d|^2 = 2 c.d + r^2 - |c|^2 that fits best, with offsets d from the mean.
+        mean = places.mean(axis=0)
+        scale = np.abs(places - mean).max()
+        d = (places - mean) / scale
+        (x, y, rest), *_ = np.linalg.lstsq(np.column_stack([2 * d, np.ones(len(d))]), (d**2).sum(axis=1), rcond=None)
+        radius = np.sqrt(max(rest + x * x + y * y, 0.0))
+        circle = Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
         moved = _moved(mesh.points[classes], places, circle, mesh.period) if _holds(circle, chain) else None
         if moved is None:
             continue
@@ -190,17 +196,6 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
         half = np.sign(spokes[fixed, 1 - axis]) * radius * np.sqrt(across)
         moved[fixed, 1 - axis] = centres[fixed, 1 - axis] + half
     return moved
-
-
-def _fit_circle(places: Float) -> Ellipses:
-    """Fit a circle |d|^2 = 2 c.d + r^2 - |c|^2 to positions (k, 2) at offsets d from the mean."""
-    mean = places.mean(axis=0)
-    scale = np.abs(places - mean).max()
-    scaled = (places - mean) / scale
-    matrix = np.column_stack([2 * scaled, np.ones(len(places))])
-    (x, y, rest), *_ = np.linalg.lstsq(matrix, (scaled**2).sum(axis=1), rcond=None)
-    radius = np.sqrt(max(rest + x * x + y * y, 0.0))
-    return Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
 
 
 def fit_ellipse(places: Float) -> Ellipses | None:

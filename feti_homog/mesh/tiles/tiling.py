@@ -239,7 +239,6 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
         ellipses=regions.ellipses,
         arc_edges=arcs[once],
         arc_circle=circle[once].astype(np.int32),
-        debonded_edges=np.zeros((0, 2), np.int32),
         origin=regions.origin,
     )
     return mesh, classes[place], tile_of

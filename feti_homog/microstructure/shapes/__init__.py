@@ -1,9 +1,10 @@
 """Outlines of fibres: discs, ellipses, rounded polygons and other convex curves, and the table rows that have them.
 
-Imports nothing.  Main entries: `outlines.Outlines`, `shapes.SHAPES`.
+Imports nothing.  Main entries: `convex_sums.Outlines`, `shapes.SHAPES`.
 """
 
+from feti_homog.microstructure.shapes.convex_sums import Outlines
 from feti_homog.microstructure.shapes.ellipses import Conics, Discs, Ellipses, gaps
-from feti_homog.microstructure.shapes.outlines import Outlines, directions, on_circle
+from feti_homog.microstructure.shapes.outlines import directions, on_circle
 
 __all__ = ["Conics", "Discs", "Ellipses", "Outlines", "convex_sums", "directions", "gaps", "on_circle", "shapes"]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
 from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
@@ -20,7 +20,7 @@ SIDES = 3, 12
 
 @dataclass(frozen=True)
 class ConvexSums(ConvexCurves):
-    """k Minkowski sums c + V + F D of a polygon V and an ellipse F D, with the unit disc D, as `Outlines`.
+    """k Minkowski sums c + V + F D of a polygon V and an ellipse F D, with the unit disc D.
 
     `centres` c (k, 2); V is the hull of `cores` (k, m, 2) about the origin; `frames` F (k, 2, 2).  The core of a circle
     or an ellipse is the origin; a core with fewer corners than m repeats a corner.
@@ -65,7 +65,11 @@ class ConvexSums(ConvexCurves):
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Maximise v . n - h_1(n) - h_2(-n) for the supports h of both outlines, as `Outlines.parting`."""
+        """Find the directions that best separate pairs: maximise v . n - h_1(n) - h_2(-n) for the supports h.
+
+        `vector` v (p, 2) goes from the first centres to the second.  Returns the normals n (p, 2), and the sums r (p,)
+        of both supports along n: the gap n . v - r is negative for an overlap.
+        """
         one, other = self[first], self[second]
 
         def gap(angle: Float) -> Float:
@@ -111,8 +115,11 @@ class ConvexSums(ConvexCurves):
         return points[shape, place] + moved, np.where(on_side[:, None], across, normal[place]), shape
 
 
+Outlines = Discs | Ellipses | ConvexSums
+
+
 class PolygonalRows:
-    """The `Shape` of table rows with `sides`: regular polygons with rounded corners.
+    """The shape of table rows with `sides`: regular polygons with rounded corners.
 
     `radius` is the circumradius; the first corner lies at `angle`.  The rounding circles touch both sides of a corner;
     `corner` is the ratio of their radius to the radius of the incircle.

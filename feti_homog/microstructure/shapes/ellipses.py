@@ -19,7 +19,7 @@ THINNEST = 0.05
 
 @dataclass(frozen=True)
 class Ellipses(ConvexCurves):
-    """k ellipses c + F p with |p| = 1, as `Outlines`; `centres` c (k, 2), `frames` F (k, 2, 2)."""
+    """k ellipses c + F p with |p| = 1; `centres` c (k, 2), `frames` F (k, 2, 2)."""
 
     frames: Float
 
@@ -128,7 +128,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, as `Outlines.parting`."""
+        """Find the directions that best separate pairs, as `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -170,7 +170,7 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
 
 
 class EllipticRows:
-    """The `Shape` of table rows that have semi-axes in place of a radius."""
+    """The shape of table rows that have semi-axes in place of a radius."""
 
     name, sizes, has_tips = "ellipses", ("a", "b"), True
     columns = MappingProxyType(
@@ -195,7 +195,7 @@ class EllipticRows:
 
 @dataclass(frozen=True)
 class Discs(ConvexCurves):
-    """k discs, as `Outlines`, with `centres` (k, 2) and `radii` (k,)."""
+    """k discs with `centres` (k, 2) and `radii` (k,)."""
 
     radii: Float
 
@@ -253,7 +253,7 @@ class Discs(ConvexCurves):
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Separate pairs along the vectors between centres, or along x for zero vectors, as `Outlines.parting`."""
+        """Separate pairs along the vectors between centres, or along x for zero vectors, as `ConvexSums.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]

@@ -1,8 +1,8 @@
-"""Protocols for fibre outlines and for shapes of table rows, and the base class of all outlines."""
+"""The base class of all fibre outlines, the ranges of table columns, and the widest gap between two curves."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -15,72 +15,20 @@ DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
 Columns = Mapping[str, Float]
 
 
-class Outlines(Protocol):
-    """k closed convex curves c + V + F D: centre c, hull V of a core, frame F and unit disc D."""
-
-    @property
-    def centres(self) -> Float:
-        """The centres c (k, 2)."""
-
-    @property
-    def cores(self) -> Float:
-        """The corners of V about the centres, (k, m, 2); the origin for outlines without a core."""
-
-    @property
-    def frames(self) -> Float:
-        """The frames F (k, 2, 2)."""
-
-    @property
-    def radii(self) -> Float:
-        """The radii (k,) of equal-area discs."""
-
-    @property
-    def longest(self) -> Float:
-        """Upper bounds (k,) on the distances between points and centres."""
-
-    @property
-    def extents(self) -> Float:
-        """The extents (k, 2, 2) from the centre along the two axes, backwards and forwards."""
-
-    def __len__(self) -> int: ...
-
-    def __getitem__(self, rows: Int | Bool) -> Self: ...
-
-    def at(self, centres: Float) -> Self:
-        """Move the outlines to other centres (k, 2)."""
-
-    def per(self, unit: float) -> Self:
-        """Divide all lengths and centres by a length unit."""
-
-    def rounded(self, decimals: int) -> Self:
-        """Round all coordinates to a number of decimals."""
-
-    def grown(self, thickness: Float) -> Self:
-        """Enlarge the outlines by rings of thickness (k,)."""
-
-    def joined(self, others: Self) -> Self:
-        """Append other outlines."""
-
-    def support(self, normal: Float) -> Float:
-        """Evaluate the support functions (k, ...) about the centres at unit vectors n (k, ..., 2)."""
-
-    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs of outlines.
-
-        `vector` v (p, 2) goes from the first centres to the second.  Returns the normals n (p, 2), and the sums r (p,)
-        of both supports along n: the gap n . v - r is negative for an overlap.
-        """
-
-    def distances(self, offsets: Float) -> Float:
-        """Return the distances (n, k) between outlines and points at vectors (n, k, 2) from the centres.
-
-        Distances from outlines that are not round are approximate.
-        """
-
-
 @dataclass(frozen=True)
 class ConvexCurves:
-    """The common base of all `Outlines`: curves about centres (k, 2)."""
+    """The common base of all outlines: k closed convex curves c + V + F D with the unit disc D.
+
+    Derived classes have the methods `grown`, `support`, `parting` and `distances`, and these fields or properties:
+
+    Attributes:
+        centres: (k, 2) centres c.
+        cores: (k, m, 2) corners of the hull V about the centres; the origin for outlines without a core.
+        frames: (k, 2, 2) frames F.
+        radii: (k,) radii of equal-area discs.
+        longest: (k,) upper bounds on the distances between points and centres.
+        extents: (k, 2, 2) extents from the centre along the two axes, backwards and forwards.
+    """
 
     centres: Float
 
@@ -106,11 +54,11 @@ class ConvexCurves:
         """Round all coordinates to a number of decimals."""
         return self._each(lambda array: array.round(decimals))
 
-    def joined(self, others: Self) -> Self:
+    def joined(self, others: "ConvexCurves") -> Self:
         """Append other outlines, whose cores have the same number of corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
-    def _each(self, function: Callable[..., Float], *others: Self) -> Self:
+    def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
         """Apply a function to every field, jointly with the same field of other curves."""
         names = [field.name for field in fields(self)]
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
@@ -122,38 +70,6 @@ class ColumnRange(NamedTuple):
     empty: float
     least: float = -np.inf
     above: float = -np.inf
-
-
-class Shape(Protocol):
-    """A shape that table rows may have, other than a disc.
-
-    Attributes:
-        name: plural name of the shape, such as "ellipses".
-        columns: columns that only this shape needs.
-        sizes: columns of the largest lengths, in place of "radius" unless they include it.
-        has_tips: whether the mesh of the shape may have nodes at debonded arc tips.
-    """
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def columns(self) -> Mapping[str, ColumnRange]: ...
-
-    @property
-    def sizes(self) -> tuple[str, ...]: ...
-
-    @property
-    def has_tips(self) -> bool: ...
-
-    def given(self, rows: Columns) -> Bool:
-        """Return which rows (N,) have this shape."""
-
-    def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
-
-    def outlines(self, rows: Columns, centres: Float) -> Outlines:
-        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:

@@ -4,13 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from feti_homog.microstructure.shapes.convex_sums import ConvexSums, PolygonalRows
+from feti_homog.microstructure.shapes.convex_sums import ConvexSums, Outlines, PolygonalRows
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, EllipticRows
-from feti_homog.microstructure.shapes.outlines import Columns, Outlines, Shape
+from feti_homog.microstructure.shapes.outlines import Columns
 from feti_homog.typing import Bool, Float
 
+Shape = EllipticRows | PolygonalRows
 SHAPES: tuple[Shape, ...] = (EllipticRows(), PolygonalRows())
-"""All shapes but discs, the shape of all other rows."""
+"""All shapes but discs, the shape of all other rows.
+
+Each has a plural `name`, the `columns` that no other shape needs, `sizes`, the columns of the largest lengths, in place
+of "radius" unless they include it, and `has_tips`, whether its mesh may have nodes at debonded arc tips.
+"""
 BOTH_SIZES = "has a radius and semi-axes; give one"
 
 

@@ -11,6 +11,8 @@ from support.pixel_images import quadrilaterals, random_image
 
 from feti_homog import Case, run
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.fill import pixel_mesher
 from feti_homog.microstructure import label_image
 
 MATERIALS = {
@@ -29,7 +31,7 @@ def case(path, image, phases=("matrix", "fibre"), **cell):
     labels = {str(k): name for k, name in enumerate(phases)}
     document = {
         "cell": {"geometry": "pixels", "file": str(path), "labels": labels} | cell,
-        "material": {name: MATERIALS[name] for name in phases},
+        "material": {name: MATERIALS[name] for name in phases if name in MATERIALS},
         "analysis": {"type": "stiffness", "plane": "strain"},
     }
     return Case.parse(document)
@@ -155,9 +157,11 @@ GREY = np.eye(4, dtype=np.uint8)
 @pytest.mark.parametrize(
     ("name", "image", "expected"),
     [
-        ("a.png", np.stack([GREY] * 3, -1), "pixels of mode RGB; expected one whole number"),
-        ("a.tif", GREY.astype(np.float32), "pixels of mode F; expected one whole number"),
-        ("a.npy", np.stack([GREY] * 3), "3x4x4 values of type uint8; expected a whole number a pixel, in rows"),
+        ("a.png", np.stack([GREY, GREY, 2 * GREY], -1), "mode RGB with colours .*: save it with a palette"),
+        ("a.png", np.stack([GREY] * 4, -1), "mode RGBA with colours or transparency"),
+        ("a.tif", GREY.astype(np.float32) / 3, "4x4 values of type float32; expected a whole number"),
+        ("a.npy", np.stack([GREY] * 3), "3x4x4 values of type uint8; .* in rows; cut one layer out of a stack"),
+        ("a.png", np.arange(144, dtype=np.uint8).reshape(12, 12), "make labels by a threshold, or fibres --image"),
         ("a.npy", 0.5 * GREY, "4x4 values of type float64; expected a whole number a pixel, in rows"),
         ("a.npy", GREY[:1], "4 x 1 pixels; expected two rows"),
         ("a.npz", [GREY, GREY], "2 arrays; expected one"),
@@ -168,6 +172,68 @@ GREY = np.eye(4, dtype=np.uint8)
 def test_faults_of_images(tmp_path, name, image, expected):
     with pytest.raises(CaseError, match=expected):
         label_image.read_labels(stored(tmp_path / name, image), LABELS, False)
+
+
+def palette(image):
+    """Return an image with a palette of three colours."""
+    picture = Image.fromarray(image, "P")
+    picture.putpalette([10, 20, 30, 200, 0, 0, 0, 90, 0])
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("palette.png", lambda path: palette(GREY).save(path)),
+        ("bits.png", lambda path: Image.fromarray(GREY > 0).save(path)),
+        ("grey_as_colours.png", lambda path: stored(path, np.stack([GREY] * 3, -1))),
+        ("opaque.png", lambda path: stored(path, np.stack([*[GREY] * 3, np.full_like(GREY, 255)], -1))),
+        ("short.tif", lambda path: stored(path, GREY.astype(np.uint16))),
+        ("packed.tif", lambda path: stored(path, GREY, compression="tiff_lzw")),
+        ("deflated.tif", lambda path: stored(path, GREY.astype(np.uint16), compression="tiff_adobe_deflate")),
+        ("real.tif", lambda path: stored(path, GREY.astype(np.float32))),
+        ("bool.npy", lambda path: stored(path, GREY > 0)),
+        ("long.npy", lambda path: stored(path, GREY.astype(np.int64))),
+        ("real.npy", lambda path: stored(path, GREY.astype(float))),
+    ],
+)
+def test_images_as_people_make_them(tmp_path, name, write):
+    write(tmp_path / name)
+    phase, phases = label_image.read_labels(tmp_path / name, LABELS, False)
+    assert np.array_equal(phase[::-1], GREY) and phases == ("matrix", "fibre")
+
+
+def with_voids(tmp_path, image, **cell):
+    """Return the mesh of an image with matrix, fibre and void."""
+    return pixel_mesher.read_cell(case(tmp_path / "a.npy", image, ("matrix", "fibre", "void"), **cell).cell)
+
+
+@pytest.mark.parametrize("cell", [{}, {"window": "mirrored"}, {"boundary": "displacement"}])
+def test_meshes_leave_voids_open(tmp_path, cell):
+    image = np.zeros((6, 7), int)
+    image[2, 2], image[5, 3:5], image[0, 4], image[0, 0] = 1, 2, 2, 2
+    mesh, copies = with_voids(tmp_path, image, pixel=0.5, **cell), 4 if "window" in cell else 1
+    assert mesh.phases == ("matrix", "fibre") and len(mesh.triangles) == 2 * 38 * copies
+    assert areas(mesh.points, mesh.triangles) == pytest.approx(0.125) and mesh.period.prod() == 10.5 * copies
+    assert np.array_equal(np.unique(mesh.triangles), np.arange(len(mesh.points)))
+    period = mesh.period if "boundary" not in cell else np.full(2, np.inf)
+    offset = np.abs(mesh.points - mesh.points[mesh.representative])
+    assert (np.isin(offset, [0.0, *period])).all()
+    keys = {tuple(point) for point in np.mod(mesh.points, period).tolist()}
+    assert len(keys) == len(np.unique(mesh.representative))
+
+
+def test_voids_part_nothing_and_leave_sides_to_tractions(tmp_path):
+    image = np.zeros((6, 6), int)
+    image[1:4, 1:4], image[2, 2] = 2, 1
+    line = "a.npy: floating parts, .*: that of 1 pixels with the one in row 4, column 3; expected the label of a void"
+    with pytest.raises(MeshError, match=line):
+        with_voids(tmp_path, image)
+    with pytest.raises(MeshError, match="voids at the sides"):
+        with_voids(tmp_path, np.roll(np.where(image == 1, 2, image), 4), boundary="traction", labels=SOLID_AND_VOID)
+
+
+SOLID_AND_VOID = {"0": "matrix", "2": "void"}
 
 
 def test_damaged_and_large_images_are_refused(tmp_path):
