@@ -5,7 +5,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import FrameType
+from types import CodeType, FrameType, MethodType
 from typing import Any
 
 import h5py
@@ -67,9 +67,33 @@ def _profiled(note: Any) -> Iterator[None]:
     before = sys.getprofile()
     sys.setprofile(note)
     try:
-        yield
+        with _monitored(note):
+            yield
     finally:
         sys.setprofile(before)
+
+
+@contextmanager
+def _monitored(note: Any) -> Iterator[None]:
+    """Note calls of methods that Cython 3 compiled, which profiles leave out since Python 3.12."""
+    if sys.version_info < (3, 12):
+        yield
+        return
+    tool, event = 3, sys.monitoring.events.CALL  # a tool without a given use
+
+    def called(code: CodeType, offset: int, function: Any, first: Any) -> None:
+        if type(function).__name__ == "cython_function_or_method":
+            note(sys._getframe(1), "c_call", MethodType(function, first))
+
+    if sys.monitoring.get_tool(tool) is None:
+        sys.monitoring.use_tool_id(tool, __name__)
+    before = sys.monitoring.register_callback(tool, event, called)
+    sys.monitoring.set_events(tool, event)
+    try:
+        yield
+    finally:
+        sys.monitoring.register_callback(tool, event, before)
+        sys.monitoring.set_events(tool, event if before else 0)
 
 
 def _is_of_ranks(function: Any) -> bool:
