@@ -19,6 +19,7 @@ from hostile.running import in_one_job, in_processes, make
 EVERY = {1: 1, 2: 5, 3: 11}
 OF_ONE_RANK = (events.FALSE_KIND, case_files.LONG_KIND)  # which another number of ranks refuses, or which rank 0 reads
 CASES, SEED = 100, 1
+MOST_IN_A_JOB = 300  # attempts, which end in time on a busy machine, too
 AT_ONCE = 2  # jobs, or processes: as many as the cores of a small machine
 
 
@@ -58,7 +59,8 @@ def tried(folder: Path, only: str, cases: int, seed: int) -> dict[str, Outcome]:
         tried_here = [a for a in shared[::step] if ranks == 1 or a.kind not in OF_ONE_RANK]
         if ranks == 1:
             tried_here += [a for a in fuzzer.attempts(prepared, cases, seed) if only in f"{a.kind}: {a.name}"]
-        parts = (tried_here[k::AT_ONCE] for k in range(AT_ONCE)) if ranks == 1 else (tried_here,)
+        count = max(AT_ONCE, -(-len(tried_here) // MOST_IN_A_JOB)) if ranks == 1 else 1
+        parts = [tried_here[k::count] for k in range(count)]
         jobs += [(part, ranks, folder / f"{ranks} ranks, {k}") for k, part in enumerate(parts) if part]
     for part, _, place in jobs:
         make(part, place)

@@ -196,6 +196,9 @@ LAYOUT: dict[str, tuple[Callable[[Path], None], str]] = {
     "another type": (tables_with("mesh/phase", np.zeros(9)), "/mesh/phase is float64 (9,), expected int32 ("),
     "half a precision": (tables_with("fibre/radius", np.zeros(1, "f2")), "/fibre/radius is float16 (1,), expected"),
     "no state 0": (with_tables(lambda f: f.move("state/0", "state/x")), "cannot read"),
+    "an unknown node": (tables_with("mesh/triangles", 10**9), "/mesh/triangles has the number 1e+09, expected 0 to"),
+    "a node nowhere": (tables_with("mesh/points", np.nan), "/mesh/points has the number nan, expected"),
+    "a large displacement": (tables_with("state/0/displacement", 1e308), "/displacement has the number 1e+308"),
 }
 
 
