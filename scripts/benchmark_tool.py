@@ -81,7 +81,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
                 columns.append(np.stack([response.stress for response in responses], axis=1))
                 for response in responses:
                     context.checks.record("", response)
-    dofs = cell.sum_over_ranks(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
+    dofs = cell.comm.allreduce(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
     cell.destroy()
     return _report(dofs, cell.summary.subdomains, columns, context.checks.iterations, context.checks.reasons)
 

@@ -196,7 +196,7 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm, thresholds: Thresholds 
         solver = torn.solver
         solutions = solver.solve_many(np.eye(3), np.zeros((solver.rows, 3)))
     boundary = comm.allreduce(max((len(d) for d in solver.interface_operators.dofs), default=0), MPI.MAX)
-    dofs = torn.sum_over_ranks(sum(s.n_dofs for s in solver.subdomains))
+    dofs = torn.comm.allreduce(sum(s.n_dofs for s in solver.subdomains))
     iterations = solutions[0].iterations if solutions[0].reason > 0 else 9999
     seconds = time.perf_counter() - start
     vectors = solver.coarse_dimension / torn.summary.subdomains

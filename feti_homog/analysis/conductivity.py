@@ -46,7 +46,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
-    if cell.summary.voids or cell.sum_over_ranks(int(cell.debonded(None).sum())) or not alike:
+    if cell.summary.voids or cell.comm.allreduce(int(cell.debonded(None).sum())) or not alike:
         return None
     shares, matrix = cell.fractions(), cell.summary.phases[0]
     c, across = np.array([shares[phase] for phase in tensors]), np.array([k[0, 0] for k in tensors.values()])

@@ -42,7 +42,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
     if cell.summary.voids:  # the lower bounds are zero
         return entries
     if is_spatial:
-        is_debonded = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+        is_debonded = cell.comm.allreduce(int(cell.debonded(None).sum())) > 0
         return entries | ({} if is_debonded or len(fractions) == 1 else _comparisons(cell, fractions))
     phases = [laws.plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
     shares, isotropic = list(fractions.values()), all(map(phase_bounds.is_isotropic, phases))

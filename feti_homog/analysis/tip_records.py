@@ -33,7 +33,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, energy.SpringEnergy) and cell.case.interfaces[0].growth == "released"):
         return law
-    has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+    has_tips = grows or cell.comm.allreduce(int(cell.debonded(None).sum())) > 0
     if not has_tips or not cell.solver.jump_operator.global_rows:
         return law
     inverses = [inverse for problem in cell.problems if (inverse := problem.solver.exact_inverse) is not None]

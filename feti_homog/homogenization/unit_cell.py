@@ -182,10 +182,6 @@ class TornCell:
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
 
-    def sum_over_ranks(self, number: int) -> int:
-        """Sum a number over all ranks.  Collective."""
-        return int(self.comm.allreduce(number))
-
     def destroy(self) -> None:
         """Free the solvers.  Collective."""
         for cell in self.problems:
@@ -205,7 +201,8 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, recovers = part.summary, case.output.mesh_error or case.output.fields
+    summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
+    del part  # the submesh of the rank takes as much memory as those of the subdomains
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)
@@ -216,7 +213,7 @@ def tear(
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, part.table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:
