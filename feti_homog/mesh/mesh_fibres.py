@@ -107,10 +107,7 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
-    one, other, between = torus.sides
-    border = torus.at_void.copy()
-    border[between] = torus.constituent[one] != torus.constituent[other]
-    triangle, k = np.nonzero(border[torus.triangle_torus_edges])
+    triangle, k = np.nonzero(torus.is_outline[torus.triangle_torus_edges])
     edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
     order = np.lexsort((edge, -area[edge], body))
