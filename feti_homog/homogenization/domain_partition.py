@@ -149,8 +149,7 @@ def distribute(
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
         pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, pieces, n_ranks)
-    table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
-    pinned = submeshes.pinned_classes(torus)
+    table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
     notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
     summary = CellSummary(
         width=mesh.width,
