@@ -148,7 +148,7 @@ def distribute(
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
         pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, pieces, n_ranks)
-    table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
+    table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
     notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
     summary = CellSummary(
         width=mesh.width,
@@ -157,7 +157,7 @@ def distribute(
         bodies=bodies,
         subdomains=len(cut.rank),
         coarse_triangles=len(mesh.triangles),
-        interface_edge=cell_remarks.longest(mesh.points[coarse_mesh.interface_edges(mesh)]),
+        interface_edge=float(torus.edge_lengths[torus.is_outline].max(initial=0.0)),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
@@ -172,9 +172,9 @@ def distribute(
         remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         shift=mesh.shift,
         across=across,
-        interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
+        interface_nodes=_interface_nodes(torus, pairs, lattice, pinned) if across else None,
     )
-    shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_classes(torus))
+    shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned)
     return [RankShare(summary, table, pairs, part) for part in shares]
 
 
@@ -221,12 +221,16 @@ def _cut_across(
     """Cut the cell across materials; return None if the policy or METIS prevents the cut."""
     triangles = len(torus.mesh.triangles)
     dofs = triangles * lattice.intervals**2
-    pieces = policy.across_pieces(dofs, n_ranks) if partition_policy.can_be_cut_across(case) else 0
+    is_image = case.cell.geometry == "pixels" and not case.cell.smooth
+    pieces = policy.across_pieces(dofs, n_ranks, is_image) if partition_policy.can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
         return None
     if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):
         return strips
-    cut = partition.decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
+    parts, counts = np.zeros(triangles, np.int64), np.array([pieces])
+    if is_image and pieces > n_ranks:
+        parts, counts = partition.blocks(torus.mesh, pieces)
+    cut = partition.decompose(torus, parts, counts, n_ranks)
     return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty
 
 
@@ -249,11 +253,10 @@ def in_cell(points: Float, period: Float) -> Float:
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
-def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Count the nodes at which two bodies could part along an interface."""
+def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice, pinned: Int) -> int:
+    """Count the nodes at which two bodies could part along an interface, without the `pinned` classes."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
-    plane = np.unique(torus.torus_edge, return_index=True)[1][between]
-    ends = np.unique(torus.node_class[torus.edges[plane]])
-    may_part = ~torus.never_part[ends] & ~np.isin(torus.class_keys[ends], submeshes.pinned_classes(torus))
+    ends = np.unique(torus.edge_ends[between])
+    may_part = ~torus.never_part[ends] & ~np.isin(torus.class_keys[ends], pinned)
     return len(between) * (lattice.intervals - 1) + int(may_part.sum())

@@ -58,7 +58,8 @@ class PartitionPolicy:
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
         tiles: tiles in the coarse mesh.
-        across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
+        across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body, and
+            label images of any size, whose bodies have long boundaries; 0 for no such cuts.
         across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
@@ -84,9 +85,9 @@ class PartitionPolicy:
     whole_ranks: int = 2
     strip_dofs: int = 30_000
 
-    def across_pieces(self, dofs: int, n_ranks: int) -> int:
+    def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
         """Return the piece count across materials, a multiple of `n_ranks`; 0 for other cuts."""
-        if dofs > self.across_dofs:
+        if not self.across_dofs or (dofs > self.across_dofs and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
             return n_ranks

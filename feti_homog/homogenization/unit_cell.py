@@ -207,7 +207,8 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, recovers = part.summary, case.output.mesh_error or case.output.fields
+    summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
+    del part  # the submesh of the rank takes as much memory as those of the subdomains
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)
@@ -218,7 +219,7 @@ def tear(
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, part.table, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as line:

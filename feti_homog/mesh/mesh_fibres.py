@@ -65,8 +65,16 @@ def fibre_circles(torus: Torus) -> Float:
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
     circles[bodies[is_round]] = torus.edge_circles[edge[is_round]]
-    not_round = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
-    for submesh in cut_bodies(torus, np.flatnonzero(not_round)):
+    mesh, n = torus.mesh, len(circles)
+    has_images = (mesh.representative[mesh.triangles] != mesh.triangles).any(axis=1)
+    reaches_side = np.bincount(torus.constituent, has_images, n) > 0
+    not_round = np.isnan(circles[:, 2]) & (torus.constituent_phase > 0)
+    inside = np.flatnonzero((not_round & ~reaches_side)[torus.constituent])
+    triangles, body = mesh.triangles[inside], torus.constituent[inside]
+    weights, middles = areas(mesh.points, triangles), sum(mesh.points[corner] for corner in triangles.T) / 3
+    area, *moments = (np.bincount(body, weights * x, n) for x in (1.0, *middles.T))
+    circles[area > 0, :2] = (np.array(moments)[:, area > 0] / area[area > 0]).T
+    for submesh in cut_bodies(torus, np.flatnonzero((not_round & reaches_side)[torus.constituent])):
         shift, closes = unwrap(submesh)
         if closes:
             middles = submesh.points[submesh.triangles].mean(axis=1) + shift
@@ -99,10 +107,7 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
-    one, other, between = torus.sides
-    border = torus.at_void.copy()
-    border[between] = torus.constituent[one] != torus.constituent[other]
-    triangle, k = np.nonzero(border[torus.triangle_torus_edges])
+    triangle, k = np.nonzero(torus.is_outline[torus.triangle_torus_edges])
     edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
     order = np.lexsort((edge, -area[edge], body))
@@ -123,7 +128,8 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]
-    sides = torus.constituent[np.stack(torus.sides[:2])]
+    one, other = (torus.constituent[side] for side in torus.sides[:2])
+    sides = np.stack([one, other])[:, one != other]
     coating, core = np.hstack([sides, sides[::-1]])
     inside = coats[coating] & ~coats[core] & (phase[core] > 0)
     is_coating = np.zeros(n, bool)

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, on_sides, representatives, twins
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, on_sides, representatives
 from feti_homog.microstructure import phase_names
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -52,10 +52,10 @@ class Torus:
     @classmethod
     def of(cls, mesh: CoarseMesh) -> Torus:
         """Identify the periodic images of a mesh, and number the constituents."""
-        node_class = np.unique(mesh.representative, return_inverse=True)[1]
+        node_class = present(mesh.representative, len(mesh.points))[1]
         edges, triangle_edges = plane_edges_of(mesh)
         low_edge = representatives(mesh.points[edges].mean(axis=1), *mesh.shift)
-        torus_edge = np.unique(low_edge, return_inverse=True)[1]
+        torus_edge = present(low_edge, len(edges))[1]
         one, other = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[one] == mesh.phase[other]
         label = components(len(mesh.triangles), one[same], other[same])
@@ -69,10 +69,10 @@ class Torus:
         circle[torus.arcs] = mesh.arc_circle
         first = np.full(label.max() + 1, len(mesh.ellipses))
         np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
-        order = np.lexsort((np.arange(len(label)), first[label], mesh.precedence))
+        order = np.lexsort((first[label], mesh.precedence))
         return replace(torus, constituent=renumber(label, order))
 
-    @cached_property
+    @property
     def triangle_torus_edges(self) -> Int:
         """The torus edge (m, 3) from vertex k to vertex k + 1 (mod 3)."""
         return self.torus_edge[self.triangle_edges]
@@ -80,8 +80,16 @@ class Torus:
     @cached_property
     def sides(self) -> tuple[Int, Int, Int]:
         """The two triangles (e,) and (e,) beside each shared torus edge, and the number (e,) of the edge."""
-        one, other = twins(self.triangle_torus_edges.ravel())
-        return one // 3, other // 3, self.triangle_torus_edges.ravel()[one]
+        edge = np.flatnonzero(np.bincount(self.triangle_torus_edges.ravel()) == 2)
+        return *edge_pairs(self.triangle_torus_edges), edge
+
+    @property
+    def is_outline(self) -> Bool:
+        """The mask (torus edges,) of edges between phases or beside voids."""
+        one, other, edge = self.sides
+        mask = self.at_void.copy()
+        mask[edge] = self.mesh.phase[one] != self.mesh.phase[other]
+        return mask
 
     @cached_property
     def debonded(self) -> Bool:
@@ -115,18 +123,22 @@ class Torus:
         turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
         return turns
 
-    @cached_property
+    @property
     def edge_ends(self) -> Int:
         """The classes (torus edges, 2) at the ends of each torus edge."""
-        plane = np.unique(self.torus_edge, return_index=True)[1]
-        return np.asarray(self.node_class[self.edges[plane]])
+        ends = np.empty((len(self.edge_keys), 2), np.int64)
+        ends[self.torus_edge[::-1]] = self.node_class[self.edges[::-1]]
+        return ends
 
     @cached_property
     def meeting(self) -> Int:
         """The number (classes,) of constituents that meet in each class."""
         corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
-        pairs = np.unique(corner * n + self.constituent[:, None])
-        return np.bincount(pairs // n, minlength=len(self.class_keys))
+        one, counts = np.zeros(len(self.class_keys), np.int64), np.ones(len(self.class_keys), np.int64)
+        one[corner] = self.constituent[:, None]
+        others = np.nonzero(one[corner] != self.constituent[:, None])
+        pairs = np.unique(corner[others] * n + self.constituent[others[0]])
+        return counts + np.bincount(pairs // n, minlength=len(counts))
 
     @cached_property
     def touching(self) -> Bool:
@@ -138,9 +150,9 @@ class Torus:
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
         one, other, edge = self.sides
-        between = edge[self.constituent[one] != self.constituent[other]]
+        between, edge_ends = edge[self.constituent[one] != self.constituent[other]], self.edge_ends
         alone = np.bincount(self.triangle_torus_edges.ravel()) == 1
-        ends = (self.edge_ends[some].ravel() for some in (between, alone))
+        ends = (edge_ends[some].ravel() for some in (between, alone))
         shared, free = (np.bincount(classes, minlength=len(self.class_keys)) for classes in ends)
         # Each edge between constituents ends a sector, and so do both sides of a void, or outside, together.
         sectors = shared + free // 2
@@ -207,8 +219,11 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     """Find the two triangles beside each shared edge, in the order of the edges."""
-    one, other = twins(triangle_edges.ravel())
-    return one // 3, other // 3
+    edges, sides = triangle_edges.ravel(), np.arange(triangle_edges.size)
+    first, last = np.zeros((2, edges.max(initial=-1) + 1), np.int64)
+    first[edges[::-1]], last[edges] = sides[::-1], sides
+    is_shared = first != last
+    return first[is_shared] // 3, last[is_shared] // 3
 
 
 def components(n: int, one: Int, other: Int) -> Int:
@@ -232,15 +247,24 @@ def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
 
 def renumber(label: Int, order: Int) -> Int:
     """Renumber labels by the first appearance in `order`."""
-    first = np.unique(label[order], return_index=True)[1]
+    first = np.empty(label.max(initial=-1) + 1, np.int64)
+    first[label[order[::-1]]] = np.arange(len(order))[::-1]
     return np.asarray(np.argsort(np.argsort(first))[label])
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
     """Find the plane edges: `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
-    ends = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    keys, which = np.unique(edge_keys(ends, len(mesh.points)), return_inverse=True)
-    edges = np.stack(np.divmod(keys, len(mesh.points)), axis=1)
+    start, stop, n = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel(), len(mesh.points)
+    sides = np.minimum(start, stop), np.maximum(start, stop)
+    # Sides in ascending order of the lower node, then of the other: sparse matrices sort faster than `np.unique`.
+    by_low = csc_matrix((sides[1], sides[0], np.arange(start.size + 1)), shape=(n, start.size)).tocsr()
+    order = csr_matrix((by_low.indices, by_low.data, by_low.indptr), shape=(n, n))
+    order.sort_indices()
+    is_first = np.diff(order.indices, prepend=-1) != 0
+    is_first[order.indptr[:-1][np.diff(order.indptr) > 0]] = True
+    which, chosen = np.empty(start.size, np.int64), order.data[is_first]
+    which[order.data] = np.cumsum(is_first) - 1
+    edges = np.stack([nodes[chosen] for nodes in sides], axis=1).astype(np.int64)
     (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
     backwards = (xa > xb) | ((xa == xb) & (ya > yb))
     edges[backwards] = edges[backwards, ::-1]

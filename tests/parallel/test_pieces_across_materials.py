@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
+from support.label_images import RUN, circles_in_pixels
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
@@ -49,6 +50,21 @@ def test_stiffness_is_the_monolithic_one(comm, cell, policy):
     assert max(max(r.checks.values()) for r in responses) < 1e-7
     assert all(r.state.iterations < 40 for r in responses)
     assert sum(map(nodes_of_parts, torn.subdomains)) == sum(len(part.mesh.points) for part in torn.parts)
+
+
+def test_label_images_with_voids_are_cut_in_blocks(comm, shared_path):
+    image = circles_in_pixels(40)
+    image[18:21, 3:30] = 2
+    if comm.rank == 0:
+        np.save(shared_path / "image.npy", image)
+    comm.barrier()
+    labels = {"0": "matrix", "1": "fibre", "2": "void"}
+    document = {"geometry": "pixels", "file": str(shared_path / "image.npy"), "labels": labels, "pixel": 0.1}
+    policy = PartitionPolicy(across_dofs=1, whole_dofs=0, across_piece_dofs=400)
+    torn, L, responses = solve(Case.parse(RUN | {"cell": document}), comm, policy=policy)
+    assert torn.summary.across and 9 <= torn.summary.subdomains <= 12
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-8
+    assert all(r.state.iterations < 40 for r in responses)
 
 
 @pytest.mark.parametrize("fault", ["strain", "hill"])

@@ -60,15 +60,13 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Project S to the trace space; `common` is as in `Neighbours.common`."""
-        self.block, self.common, self._operator = block, common, operator
-        subdomain, S = block.subdomain, operator.S
+        """Find the trace space and the part of M^-1; `common` is as in `Neighbours.common`."""
+        self.block, self.common, self._operator, subdomain = block, common, operator, block.subdomain
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
-        self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
         # Part W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1 (rows, rows); single precision separates soft from stiff modes.
         BW = block.BW.astype(np.float32)
-        self._share = BW @ (BW @ S.astype(np.float32)).T
+        self._share = BW @ (BW @ operator.S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
         """Yield neighbours t and the part (r, r) of this subdomain in M^-1 on r common rows."""
@@ -83,7 +81,8 @@ class SubdomainEigenproblem:
         for s, share in sorted(shares, key=lambda part: part[0]):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
-        modes = np.asarray(self._P @ soft_modes(self._regular_S, N, threshold))
+        S = congruent(self._P, self._operator.S) + self._operator.regularisation(self._P)
+        modes = np.asarray(self._P @ soft_modes(S, N, threshold))
         return self._operator.apply_flexibility(jump_forces(self.block.B, modes, self.block.R, M))
 
 

@@ -8,7 +8,7 @@ import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
-from feti_homog.mesh import Torus, periodic_topology
+from feti_homog.mesh import CoarseMesh, Torus, periodic_topology
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Int
 
@@ -65,6 +65,17 @@ def halves(torus: Torus) -> Partition | None:
     return Partition(piece, np.arange(2)) if is_whole else None
 
 
+def blocks(mesh: CoarseMesh, count: int) -> tuple[Int, Int]:
+    """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`.
+
+    Both triangles of a pixel have its lower left corner as lower left corner.
+    """
+    side = np.sqrt(mesh.width * mesh.height / count)
+    grid = np.maximum(1, np.round(mesh.period / side)).astype(np.int64)
+    column, row = (mesh.points[mesh.triangles].min(axis=1) / mesh.period * grid).astype(np.int64).T
+    return np.asarray(row * grid[0] + column), np.ones(grid.prod(), np.int64)
+
+
 def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:
     """Compute the subdomain (m,) of every triangle by METIS.
 
@@ -78,9 +89,9 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
         length_classes: number of edge lengths that METIS distinguishes; with 1 all edges have equal weight.
     """
     tail, head, edge = torus.sides
-    inside = parts[tail] == parts[head]
-    weight = np.ceil(length_classes * torus.edge_lengths[edge] / longest).astype(np.int64)
-    left, right, weight = tail[inside], head[inside], weight[inside]
+    inside = (parts[tail] == parts[head]) & (pieces[parts[tail]] > 1)
+    left, right = tail[inside], head[inside]
+    weight = np.ceil(length_classes * torus.edge_lengths[edge[inside]] / longest).astype(np.int64)
     members, sides = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
     load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
     first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges

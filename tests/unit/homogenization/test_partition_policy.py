@@ -52,4 +52,9 @@ def test_cells_of_fewer_pieces_than_ranks_are_cut_by_bodies():
 )
 def test_pieces_are_of_the_fastest_size(dofs, ranks, pieces):
     assert BY_COST.across_pieces(dofs, ranks) == pieces
-    assert DEFAULT_POLICY.across_pieces(dofs, ranks) == 0
+    assert DEFAULT_POLICY.across_pieces(dofs, ranks) == DEFAULT_POLICY.across_pieces(dofs, ranks, True) == 0
+
+
+def test_label_images_of_any_size_are_cut_across_materials():
+    assert BY_COST.across_pieces(7_000_000, 2, True) == 1000
+    assert BY_COST.across_pieces(300_000, 2, True) == BY_COST.across_pieces(300_000, 2) == 2

@@ -5,7 +5,8 @@ import pytest
 from support.generated_meshes import generate
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.feti.decomposition.partition import decompose, halves, pieces_for_count, pieces_for_size
+from feti_homog.feti.decomposition.partition import blocks, decompose, halves, pieces_for_count, pieces_for_size
+from feti_homog.mesh.fill.pixel_mesher import read_cell
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_classes
 
@@ -52,6 +53,20 @@ def test_halves_are_connected_even_and_shorter_around_than_those_of_metis(torus)
     assert components(len(found.subdomain), left[inside], right[inside]).max() == 1
     assert abs(found.subdomain.mean() - 0.5) < 0.03
     assert (~inside).sum() < (metis.subdomain[left] != metis.subdomain[right]).sum()
+
+
+def test_blocks_are_even_rectangles_of_whole_pixels(tmp_path):
+    image = np.zeros((30, 47), np.uint8)
+    image[5:9, 7:20] = 1
+    np.save(tmp_path / "image.npy", image)
+    labels = {"0": "matrix", "1": "fibre"}
+    mesh = read_cell(Cell(geometry="pixels", file=tmp_path / "image.npy", labels=labels, pixel=0.1))
+    block, pieces = blocks(mesh, 15)
+    assert np.array_equal(block[::2], block[1::2])  # both triangles of a pixel
+    rectangles = block[::2].reshape(image.shape)
+    assert (rectangles == rectangles[:, :1] + rectangles[:1]).all() and (pieces == 1).all()
+    assert np.array_equal(np.unique(rectangles), np.arange(len(pieces))) and len(pieces) == 15
+    assert np.ptp(np.bincount(rectangles.ravel())) <= 10  # a column
 
 
 def test_pieces_have_the_wanted_size(torus):
