@@ -162,7 +162,7 @@ def read_index(directory: Path) -> SweepIndex:
         is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)
         if not is_sound or not all(e.inputs.keys() == first and 0.0 < e.inputs.get(drawn, 0.5) < 1.0 for e in entries):
             raise TypeError("a name, number or input of a case is missing or of another type")
-        return SweepIndex(*texts[:2], entries)
+        return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (AttributeError, ValueError, LookupError, TypeError) as error:
