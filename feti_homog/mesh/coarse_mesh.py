@@ -35,8 +35,8 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
         low, high = (np.flatnonzero(points[:, axis] == level) for level in (0.0, period[axis]))
         low, high = (nodes[np.argsort(along[nodes])] for nodes in (low, high))
         if len(low) != len(high) or not np.allclose(along[low], along[high], 0.0, SAME_PLACE * float(np.ptp(points))):
-            _, left, right = np.intersect1d(along[low], along[high], return_indices=True)
-            low, high = low[left], high[right]
+            _, at_low, at_high = np.intersect1d(along[low], along[high], return_indices=True)
+            low, high = low[at_low], high[at_high]
         yield axis, low, high
 
 

@@ -136,8 +136,8 @@ class Torus:
         corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
         one, counts = np.zeros(len(self.class_keys), np.int64), np.ones(len(self.class_keys), np.int64)
         one[corner] = self.constituent[:, None]
-        others = np.nonzero(one[corner] != self.constituent[:, None])
-        pairs = np.unique(corner[others] * n + self.constituent[others[0]])
+        entries = np.nonzero(one[corner] != self.constituent[:, None])
+        pairs = np.unique(corner[entries] * n + self.constituent[entries[0]])
         return counts + np.bincount(pairs // n, minlength=len(counts))
 
     @cached_property

@@ -124,12 +124,17 @@ def _require_mesh(path: Path, file: Any) -> None:
         corners = points[triangles[start : start + assembly.ELEMENTS_AT_ONCE]]
         (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference, (1, 1)), (1, 3), (0, 1))
         flat += np.count_nonzero(xr * ys - yr * xs <= 1e-20 * span.prod())
-    off = np.stack([file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")])
+    apart = np.stack(
+        [file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")]
+    )
     phases, labels = file.attrs["phases"], [state.attrs["label"] for state in file.get("state", {}).values()]
     for holds, fault in (
         (not flat, f"{flat} elements have no area"),
         (np.isin(file["fibre/body"], file["mesh/body"]).all(), "a fibre has no elements"),
-        ((np.abs(off - size * np.round(off / size)) <= 1e-5 * size.max()).all(), "interface nodes are not in the mesh"),
+        (
+            (np.abs(apart - size * np.round(apart / size)) <= 1e-5 * size.max()).all(),
+            "interface nodes are not in the mesh",
+        ),
         (all({phase, phase.partition(":")[0]} & {*case["material"]} for phase in phases), "its case has other phases"),
         (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name has other letters"),
     ):

@@ -72,8 +72,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if largest == landmarks.LARGEST:
         leg_of, fall = path_curves.legs_of(document), landmarks.fall_of(document, peak)
         at_end = peak["event"] == np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
-        whole = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
-        text += f"; {whole} ends {'there' if at_end else f'near its peak, {fall:.1%} below it'}"
+        curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
+        text += f"; {curve} ends {'there' if at_end else f'near its peak, {fall:.1%} below it'}"
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
