@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import interface_section, sections, toml_files
+from feti_homog.case import bond_laws, interface_section, sections, toml_files
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
-from feti_homog.results import atomic, result_json
+from feti_homog.results import atomic, path_curves, result_json
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment, Axis, rounded, sampled_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
@@ -30,6 +30,7 @@ from feti_homog.typing import Float
 
 STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
+SAME_VALUE = 1e-9  # relative difference of computed values by rounding, and by the tolerance of the solver
 Point = tuple[float, ...]
 
 
@@ -115,17 +116,20 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
+            results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
+            table = [*path_curves.interface_sections(results[0]), {}][0]
+            softens = bond_laws.LAWS[table.get("criterion", bond_laws.DEFAULT)].softens
+            teeth = f"{table.get('teeth') or 'few'} teeth" if softens else ""
+            document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates, teeth)}
             rows = [[datum[name] for name in fit_result.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([fit_result.HEAD, *rows]))
-            results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
             pictures.draw_fit(evaluator.directory / "fit.png", document, results)
             return document
 
         return mpi_errors.on_root(evaluator.comm, write, evaluations.estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
-        return study_tables.fit_text(document)
+        return study_tables.fit_text(document, self.axes())
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:
@@ -150,12 +154,14 @@ class Evaluations:
     Attributes:
         answers: on rank 0 the results of all tests by unknowns, without evaluations that failed.
         folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
+        steps: on rank 0 the last steps of differences by number of the unknown.
     """
 
     fit: Fit
     evaluator: Evaluator
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
     folders: dict[Point, str] = field(default_factory=dict)
+    steps: dict[int, float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
         """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
@@ -182,7 +188,11 @@ class Evaluations:
         start, low, high = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
 
         def search(x: Float) -> estimation.ParameterEstimates:
-            return estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
+            estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
+            best = min(map(np.array, self.answers), key=squares)
+            if squares(best) < (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals):
+                return search(best)  # a point of wide differences
+            return replace(estimates, evaluations=len(self.answers))
 
         def squares(x: Float) -> float:
             with suppress(CaseError, ConvergenceError):
@@ -203,7 +213,7 @@ class Evaluations:
         best = min([start, *(np.array([*point.values()]) for point in further)], key=squares)
         if estimates is None or squares(best) < estimates.residuals @ estimates.residuals:
             estimates = search(best)  # without any sound point this has the fault of the start again
-        return replace(estimates, evaluations=len(self.answers))
+        return estimates
 
     def values(self, x: Float) -> Float:
         """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
@@ -218,7 +228,11 @@ class Evaluations:
         return np.concatenate([answer.values for answer in self.answers[key]])
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0."""
+        """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
+
+        Data may be constant between the steps of a softening law with few teeth: a difference without effect is
+        repeated with twice the step, up to `estimation.WIDEST`; the next differences begin with half of the last step.
+        """
         key, names = _rounded(x), [*self.fit.unknowns]
         J = np.zeros((len(self.values(x)), len(key)))
         missing = list[tuple[int, int]]()
@@ -228,17 +242,36 @@ class Evaluations:
                 missing.append((test, k))
             else:
                 J[self.fit.rows_of(test), k] = column
-        if missing:
-            places = list[tuple[int, Point]]()
-            for test, k in missing:  # a step down and a step up, within the bounds
-                unknown = [*self.fit.unknowns.values()][k]
-                step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
-                ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
-                places += [(test, _rounded([*key[:k], end, *key[k + 1 :]])) for end in ends]
-            answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
-            for n, (test, k) in enumerate(missing):
-                (below, above), ((_, low), (_, high)) = answers[2 * n : 2 * n + 2], places[2 * n : 2 * n + 2]
-                J[self.fit.rows_of(test), k] = (above.values - below.values) / (high[k] - low[k])
+        if not missing:
+            return J
+        unknowns, std = [*self.fit.unknowns.values()], np.array([datum.std for datum in self.fit.data])
+        widths = [unknown.upper - unknown.lower for unknown in unknowns]
+        steps = [
+            max(DIFFERENCE * (abs(x) or width), self.steps.get(k, 0.0) / 2)
+            for k, (x, width) in enumerate(zip(key, widths, strict=True))
+        ]
+
+        def ends(k: int) -> list[Point]:
+            """Return a step of unknown k down and a step up, within its bounds."""
+            unknown, step = unknowns[k], steps[k]
+            ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
+            return [_rounded([*key[:k], end, *key[k + 1 :]]) for end in ends]
+
+        def slopes(k: int, rows: slice, below: Float, above: Float) -> Float:
+            """Return the derivatives by unknown k; 0 if all differences are rounding."""
+            (low, high), noise = ends(k), SAME_VALUE * (std[rows] + np.abs(below))
+            return (above - below) / (high[k] - low[k]) * (np.abs(above - below) > noise).any()
+
+        places = [(test, end) for test, k in missing for end in ends(k)]
+        answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
+        for (test, k), below, above in zip(missing, answers[::2], answers[1::2], strict=True):
+            rows = self.fit.rows_of(test)
+            J[rows, k] = slopes(k, rows, below.values, above.values)
+        for k in sorted({k for _, k in missing}):
+            while not J[:, k].any() and steps[k] < estimation.WIDEST * widths[k]:
+                steps[k] = min(2.0 * steps[k], estimation.WIDEST * widths[k])
+                J[:, k] = slopes(k, slice(None), *map(self.values, map(np.array, ends(k))))
+            self.steps[k] = steps[k]
         return J
 
     def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
