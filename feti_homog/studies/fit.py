@@ -31,6 +31,7 @@ from feti_homog.typing import Float
 STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
 SAME_VALUE = 1e-9  # relative difference of computed values by rounding, and by the tolerance of the solver
+SIDES = (-1, 1)
 Point = tuple[float, ...]
 
 
@@ -102,10 +103,14 @@ class Fit(Study):
         unknowns = {name: asdict(unknown) for name, unknown in self.unknowns.items()}
         return {"cases": cases, "unknowns": unknowns, "data": [asdict(datum) for datum in self.data]}
 
+    def counts(self) -> str:
+        numbers = {"unknown": self.unknowns, "measured value": self.data}
+        return ", ".join(f"{len(values)} {name}{'s' * (len(values) != 1)}" for name, values in numbers.items())
+
     def heading(self) -> str:
         remark = f"remark     {axes}\n" if (axes := self.axes()) else ""
-        counts = f"{len(self.unknowns)} unknowns, {len(self.data)} measured values of {len(self.tests)} tests"
-        return f"{remark}fit        {counts}; the first at the start:"
+        tests = f"{len(self.tests)} test{'s' * (len(self.tests) != 1)}"
+        return f"{remark}fit        {self.counts()} of {tests}; the first at the start:"
 
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
@@ -154,14 +159,16 @@ class Evaluations:
     Attributes:
         answers: on rank 0 the results of all tests by unknowns, without evaluations that failed.
         folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
-        steps: on rank 0 the last steps of differences by number of the unknown.
+        computed: on rank 0 the computed data (m,) by unknowns, also at the ends of differences.
+        steps: on rank 0 the last steps of differences by number of the unknown and side.
     """
 
     fit: Fit
     evaluator: Evaluator
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
     folders: dict[Point, str] = field(default_factory=dict)
-    steps: dict[int, float] = field(default_factory=dict)
+    computed: dict[Point, Float] = field(default_factory=dict)
+    steps: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
         """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
@@ -189,9 +196,10 @@ class Evaluations:
 
         def search(x: Float) -> estimation.ParameterEstimates:
             estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
-            best = min(map(np.array, self.answers), key=squares)
-            if squares(best) < (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals):
-                return search(best)  # a point of wide differences
+            sums = {point: float(np.square((values - y) / std).sum()) for point, values in self.computed.items()}
+            best = min(sums, key=sums.__getitem__)
+            if sums[best] < (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals):
+                return search(np.array(best))  # a point of differences
             return replace(estimates, evaluations=len(self.answers))
 
         def squares(x: Float) -> float:
@@ -225,53 +233,60 @@ class Evaluations:
                 pairs = zip(self.fit.unknowns, key, strict=True)
                 numbers = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
                 standard_streams.say(f"evaluation {len(self.folders)}: {numbers}")
-        return np.concatenate([answer.values for answer in self.answers[key]])
+        self.computed[key] = np.concatenate([answer.values for answer in self.answers[key]])
+        return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
         """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
 
-        Data may be constant between the steps of a softening law with few teeth: a difference without effect is
-        repeated with twice the step, up to `estimation.WIDEST`; the next differences begin with half of the last step.
+        A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
+        twice the step, up to `estimation.WIDEST`.  The next differences begin with half of the last steps.
         """
-        key, names = _rounded(x), [*self.fit.unknowns]
-        J = np.zeros((len(self.values(x)), len(key)))
+        key, names, centre = _rounded(x), [*self.fit.unknowns], self.values(x)
+        J, is_missing = np.zeros((2, len(centre), len(key)))
         missing = list[tuple[int, int]]()
         for (test, answer), (k, name) in product(enumerate(self.answers[key]), enumerate(names)):
             column = exact_derivatives(answer.document, self.fit.data_of(test), name)
             if column is None:
                 missing.append((test, k))
+                is_missing[self.fit.rows_of(test), k] = True
             else:
                 J[self.fit.rows_of(test), k] = column
         if not missing:
             return J
         unknowns, std = [*self.fit.unknowns.values()], np.array([datum.std for datum in self.fit.data])
         widths = [unknown.upper - unknown.lower for unknown in unknowns]
-        steps = [
-            max(DIFFERENCE * (abs(x) or width), self.steps.get(k, 0.0) / 2)
-            for k, (x, width) in enumerate(zip(key, widths, strict=True))
-        ]
+        steps = {
+            (k, side): max(DIFFERENCE * (abs(key[k]) or widths[k]), self.steps.get((k, side), 0.0) / 2)
+            for k, side in product(range(len(key)), SIDES)
+        }
 
-        def ends(k: int) -> list[Point]:
-            """Return a step of unknown k down and a step up, within its bounds."""
-            unknown, step = unknowns[k], steps[k]
-            ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
-            return [_rounded([*key[:k], end, *key[k + 1 :]]) for end in ends]
+        def end(k: int, side: int) -> Point:
+            """Return the point a step of unknown k away, within the bounds."""
+            value = min(max(key[k] + side * steps[k, side], unknowns[k].lower), unknowns[k].upper)
+            return _rounded([*key[:k], value, *key[k + 1 :]])
 
-        def slopes(k: int, rows: slice, below: Float, above: Float) -> Float:
-            """Return the derivatives by unknown k; 0 if all differences are rounding."""
-            (low, high), noise = ends(k), SAME_VALUE * (std[rows] + np.abs(below))
-            return (above - below) / (high[k] - low[k]) * (np.abs(above - below) > noise).any()
-
-        places = [(test, end) for test, k in missing for end in ends(k)]
+        places = [(test, end(k, side)) for test, k in missing for side in SIDES]
         answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
-        for (test, k), below, above in zip(missing, answers[::2], answers[1::2], strict=True):
-            rows = self.fit.rows_of(test)
-            J[rows, k] = slopes(k, rows, below.values, above.values)
         for k in sorted({k for _, k in missing}):
-            while not J[:, k].any() and steps[k] < estimation.WIDEST * widths[k]:
-                steps[k] = min(2.0 * steps[k], estimation.WIDEST * widths[k])
-                J[:, k] = slopes(k, slice(None), *map(self.values, map(np.array, ends(k))))
-            self.steps[k] = steps[k]
+            ends = np.array([centre, centre])
+            for n, (test, _) in ((n, pair) for n, pair in enumerate(missing) if pair[1] == k):
+                ends[:, self.fit.rows_of(test)] = [answer.values for answer in answers[2 * n : 2 * n + 2]]
+            for values, side in zip(ends, SIDES, strict=True):
+                if is_missing[:, k].all():
+                    self.computed[end(k, side)] = values.copy()
+                noise, widest = SAME_VALUE * (std + np.abs(centre)), estimation.WIDEST * widths[k]
+                while (np.abs(values - centre) <= noise).all() and steps[k, side] < widest:
+                    steps[k, side] = min(2.0 * steps[k, side], widest)
+                    with suppress(CaseError, ConvergenceError):
+                        values[:] = self.values(np.array(end(k, side)))
+                        continue
+                    steps[k, side] /= 2
+                    break
+                values[:] = np.where((np.abs(values - centre) <= noise).all(), centre, values)
+            low, high = (end(k, side)[k] for side in SIDES)
+            J[:, k] = np.where(is_missing[:, k], (ends[1] - ends[0]) / (high - low), J[:, k])
+        self.steps = steps
         return J
 
     def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:

@@ -122,7 +122,8 @@ class Table:
                 blocks += ["  " + "    ".join(group) for group in groups]
             elif self.title_in_head:
                 width = -self.columns[0].width
-                title, blocks = [], [f"{self.title:<{width}}{head[width:]}", *texts]
+                rest = head[width:].removeprefix(" " * (len(self.title) - width))  # a long title takes its spaces
+                title, blocks = [], [f"{self.title:<{width}}{rest}", *texts]
             else:
                 blocks += [head, *texts]
         return [line.rstrip() for line in (*title, *blocks, *self.below)]
