@@ -81,19 +81,18 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _result_folder(arguments: argparse.Namespace) -> Path:
     """Return the result folder in the arguments.  Raises CaseError for a file, no folder, or the folder of a study."""
     directory: Path = arguments.directory
-    if not os.path.lexists(directory):
-        raise CaseError(f"{directory}: no such folder")
-    if os.path.isfile(directory):
-        raise CaseError(f"{directory}: expected the folder of a result, not a file")
-    studies = {"fit.json": "a fit: see fit.png and", "uncertainty.json": "a study of scatter: see"}
-    if os.path.exists(directory / result_json.NAME):
-        return directory
-    if os.path.exists(directory / case_folders.INDEX_FILE):
+    if not os.path.isdir(directory):
+        is_file = os.path.exists(directory)
+        raise CaseError(
+            f"{directory}: {'expected the folder of a result, not a file' if is_file else 'no such folder'}"
+        )
+    is_result = os.path.exists(directory / result_json.NAME)
+    names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name) and not is_result]
+    if names == [case_folders.INDEX_FILE]:
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` draws a sweep"
         )
-    for name, study in studies.items():
-        if os.path.exists(directory / name):
-            raise CaseError(f"{directory} has {study} {name}; expected the folder of a result")
+    if names:
+        raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")
     return directory

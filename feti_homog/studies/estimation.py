@@ -162,9 +162,10 @@ def summarize(
                      singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
 
 
-def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
+def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], alone: str = "") -> list[str]:
     """Return a message for each direction that the data do not determine."""
-    reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
+    alone = alone or "no measured value depends on it"
+    reasons = {True: alone, False: "the measured values do not determine them together"}
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import bond_laws, interface_section, sections, toml_files
+from feti_homog.case import interface_section, sections, toml_files
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import study_tables
-from feti_homog.results import atomic, path_curves, result_json
+from feti_homog.results import atomic, result_json
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment, Axis, rounded, sampled_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
@@ -31,7 +31,6 @@ from feti_homog.typing import Float
 STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
 SAME_VALUE = 1e-9  # relative difference of computed values by rounding, and by the tolerance of the solver
-SIDES = (-1, 1)
 Point = tuple[float, ...]
 
 
@@ -103,14 +102,10 @@ class Fit(Study):
         unknowns = {name: asdict(unknown) for name, unknown in self.unknowns.items()}
         return {"cases": cases, "unknowns": unknowns, "data": [asdict(datum) for datum in self.data]}
 
-    def counts(self) -> str:
-        numbers = {"unknown": self.unknowns, "measured value": self.data}
-        return ", ".join(f"{len(values)} {name}{'s' * (len(values) != 1)}" for name, values in numbers.items())
-
     def heading(self) -> str:
         remark = f"remark     {axes}\n" if (axes := self.axes()) else ""
-        tests = f"{len(self.tests)} test{'s' * (len(self.tests) != 1)}"
-        return f"{remark}fit        {self.counts()} of {tests}; the first at the start:"
+        counts = f"{len(self.unknowns)} unknowns, {len(self.data)} measured values of {len(self.tests)} tests"
+        return f"{remark}fit        {counts}; the first at the start:"
 
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
         if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
@@ -121,14 +116,11 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
-            table = [*path_curves.interface_sections(results[0]), {}][0]
-            softens = bond_laws.LAWS[table.get("criterion", bond_laws.DEFAULT)].softens
-            teeth = f"{table.get('teeth') or 'few'} teeth" if softens else ""
+            teeth = next((bond.teeth for bond in self.first_cases().cases[0].interfaces if bond.teeth), 0)
             document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates, teeth)}
             rows = [[datum[name] for name in fit_result.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([fit_result.HEAD, *rows]))
-            pictures.draw_fit(evaluator.directory / "fit.png", document, results)
+            pictures.draw_fit(evaluator.directory / "fit.png", document, evaluations.answers[_rounded(estimates.x)])
             return document
 
         return mpi_errors.on_root(evaluator.comm, write, evaluations.estimate())
@@ -142,14 +134,6 @@ def _rounded(x: Sequence[float] | Float) -> Point:
     return tuple(map(rounded, x))
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The result.json of a test, and the computed values (m,) of the data of the test."""
-
-    document: Mapping[str, Any]
-    values: Float
-
-
 @dataclass
 class Evaluations:
     """The evaluations of a fit: computed data and derivatives.
@@ -157,15 +141,15 @@ class Evaluations:
     Rank 0 runs the search and asks for evaluations; all ranks compute.
 
     Attributes:
-        answers: on rank 0 the results of all tests by unknowns, without evaluations that failed.
+        answers: on rank 0 result.json of all tests by unknowns, without evaluations that failed.
         folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
         computed: on rank 0 the computed data (m,) by unknowns, also at the ends of differences.
-        steps: on rank 0 the last steps of differences by number of the unknown and side.
+        steps: on rank 0 the last steps of differences by number of the unknown, and side.
     """
 
     fit: Fit
     evaluator: Evaluator
-    answers: dict[Point, list[Answer]] = field(default_factory=dict)
+    answers: dict[Point, list[Mapping[str, Any]]] = field(default_factory=dict)
     folders: dict[Point, str] = field(default_factory=dict)
     computed: dict[Point, Float] = field(default_factory=dict)
     steps: dict[tuple[int, int], float] = field(default_factory=dict)
@@ -194,18 +178,14 @@ class Evaluations:
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         start, low, high = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
 
+        def squares(point: Point) -> float:
+            return float(np.square((self.computed[point] - y) / std).sum())
+
         def search(x: Float) -> estimation.ParameterEstimates:
             estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
-            sums = {point: float(np.square((values - y) / std).sum()) for point, values in self.computed.items()}
-            best = min(sums, key=sums.__getitem__)
-            if sums[best] < (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals):
-                return search(np.array(best))  # a point of differences
-            return replace(estimates, evaluations=len(self.answers))
-
-        def squares(x: Float) -> float:
-            with suppress(CaseError, ConvergenceError):
-                return float(np.square((self.values(x) - y) / std).sum())
-            return np.inf
+            best = min(self.computed, key=squares)
+            is_best = squares(best) >= (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals)
+            return replace(estimates, evaluations=len(self.answers)) if is_best else search(np.array(best))
 
         with suppress(CaseError):
             estimates = search(start)
@@ -217,23 +197,24 @@ class Evaluations:
             Axis(path, ends=(u.lower, u.upper), log=u.lower > 0.0)
             for path, u in zip(self.fit.paths, unknowns, strict=True)
         ]
-        further = sampled_points(box, sections.SweepSection(samples=STARTS - 1))
-        best = min([start, *(np.array([*point.values()]) for point in further)], key=squares)
-        if estimates is None or squares(best) < estimates.residuals @ estimates.residuals:
-            estimates = search(best)  # without any sound point this has the fault of the start again
-        return estimates
+        for point in [start, *sampled_points(box, sections.SweepSection(samples=STARTS - 1))]:
+            with suppress(CaseError, ConvergenceError):
+                self.values(np.array([*point.values()]) if isinstance(point, dict) else point)
+        # Without any sound point the search has the fault of the start again.
+        return search(np.array(min(self.computed, key=squares, default=start)))
 
     def values(self, x: Float) -> Float:
         """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
-            self.answers[key] = self._ask(folder, [(test, key) for test in range(len(self.fit.tests))])
+            answers = self._ask(folder, [(test, key) for test in range(len(self.fit.tests))])
+            self.answers[key] = [document for document, _ in answers]
+            self.computed[key] = np.concatenate([values for _, values in answers])
             if not self.evaluator.quiet:
                 pairs = zip(self.fit.unknowns, key, strict=True)
                 numbers = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
                 standard_streams.say(f"evaluation {len(self.folders)}: {numbers}")
-        self.computed[key] = np.concatenate([answer.values for answer in self.answers[key]])
         return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
@@ -242,62 +223,51 @@ class Evaluations:
         A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
         twice the step, up to `estimation.WIDEST`.  The next differences begin with half of the last steps.
         """
-        key, names, centre = _rounded(x), [*self.fit.unknowns], self.values(x)
-        J, is_missing = np.zeros((2, len(centre), len(key)))
-        missing = list[tuple[int, int]]()
-        for (test, answer), (k, name) in product(enumerate(self.answers[key]), enumerate(names)):
-            column = exact_derivatives(answer.document, self.fit.data_of(test), name)
-            if column is None:
-                missing.append((test, k))
-                is_missing[self.fit.rows_of(test), k] = True
-            else:
-                J[self.fit.rows_of(test), k] = column
-        if not missing:
-            return J
-        unknowns, std = [*self.fit.unknowns.values()], np.array([datum.std for datum in self.fit.data])
-        widths = [unknown.upper - unknown.lower for unknown in unknowns]
+        key, centre = _rounded(x), self.values(x)
+        J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
+        for test, (k, name) in product(tests, enumerate(unknowns)):
+            column = exact_derivatives(self.answers[key][test], self.fit.data_of(test), name)
+            J[self.fit.rows_of(test), k] = np.nan if column is None else column
+        bounds = [(unknown.lower, unknown.upper) for unknown in unknowns.values()]
+        widths, noise = np.ptp(bounds, axis=1), SAME_VALUE * (np.abs(centre) + [datum.std for datum in self.fit.data])
         steps = {
-            (k, side): max(DIFFERENCE * (abs(key[k]) or widths[k]), self.steps.get((k, side), 0.0) / 2)
-            for k, side in product(range(len(key)), SIDES)
+            (k, side): side * max(DIFFERENCE * (abs(key[k]) or widths[k]), abs(self.steps.get((k, side), 0.0)) / 2)
+            for k, side in product(np.flatnonzero(np.isnan(J).any(axis=0)).tolist(), (-1, 1))
         }
 
-        def end(k: int, side: int) -> Point:
+        def end(k: int, step: float) -> Point:
             """Return the point a step of unknown k away, within the bounds."""
-            value = min(max(key[k] + side * steps[k, side], unknowns[k].lower), unknowns[k].upper)
-            return _rounded([*key[:k], value, *key[k + 1 :]])
+            return _rounded([*key[:k], np.clip(key[k] + step, *bounds[k]), *key[k + 1 :]])
 
-        places = [(test, end(k, side)) for test, k in missing for side in SIDES]
-        answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
-        for k in sorted({k for _, k in missing}):
-            ends = np.array([centre, centre])
-            for n, (test, _) in ((n, pair) for n, pair in enumerate(missing) if pair[1] == k):
-                ends[:, self.fit.rows_of(test)] = [answer.values for answer in answers[2 * n : 2 * n + 2]]
-            for values, side in zip(ends, SIDES, strict=True):
-                if is_missing[:, k].all():
-                    self.computed[end(k, side)] = values.copy()
-                noise, widest = SAME_VALUE * (std + np.abs(centre)), estimation.WIDEST * widths[k]
-                while (np.abs(values - centre) <= noise).all() and steps[k, side] < widest:
-                    steps[k, side] = min(2.0 * steps[k, side], widest)
-                    with suppress(CaseError, ConvergenceError):
-                        values[:] = self.values(np.array(end(k, side)))
-                        continue
-                    steps[k, side] /= 2
-                    break
-                values[:] = np.where((np.abs(values - centre) <= noise).all(), centre, values)
-            low, high = (end(k, side)[k] for side in SIDES)
-            J[:, k] = np.where(is_missing[:, k], (ends[1] - ends[0]) / (high - low), J[:, k])
+        ends = [end(k, step) for (k, _), step in steps.items()]
+        name = self.folders[key].replace("evaluation", "differences")
+        answers = iter(self._ask(name, [(test, point) for point in ends for test in tests]) if ends else ())
+        self.computed |= {point: np.concatenate([next(answers)[1] for _ in tests]) for point in ends}
+        for (k, side), widest in ((pair, estimation.WIDEST * widths[pair[0]]) for pair in steps):
+            with suppress(CaseError, ConvergenceError):
+                while (
+                    abs(step := steps[k, side]) < widest
+                    and (np.abs(self.computed[end(k, step)] - centre) <= noise).all()
+                ):
+                    self.values(np.array(end(k, wider := side * min(2.0 * abs(step), widest))))
+                    steps[k, side] = wider
+        for k in {k for k, _ in steps}:
+            low, high = (end(k, steps[k, side]) for side in (-1, 1))
+            change = self.computed[high] - self.computed[low]
+            slope = change * (np.abs(change) > noise).any() / (high[k] - low[k])
+            J[:, k] = np.where(np.isnan(J[:, k]), slope, J[:, k])
         self.steps = steps
         return J
 
-    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
         self.evaluator.comm.bcast((name, places))
         return self._run(name, places)
 
-    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
         """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]
         pairs = zip(documents, data, strict=False)  # other ranks have no results
-        answers = mpi_errors.on_root_only(comm, lambda: [Answer(r, predicted(r, y)) for r, y in pairs])
+        answers = mpi_errors.on_root_only(comm, lambda: [(r, predicted(r, y)) for r, y in pairs])
         return answers or []

@@ -37,7 +37,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
     fit = Fit(document, folder, named, [*unknowns], assignments, data)
     start, faults = [unknown.start for unknown in unknowns.values()], list[str]()
     if len(data) < len(unknowns):
-        faults.append(f"[{sections.UNKNOWN}]: {fit.counts()}; expected at least as many values")
+        counts = f"{len(unknowns)} unknowns, {len(data)} measured value{'s' * (len(data) > 1)}"
+        faults.append(f"[{sections.UNKNOWN}]: {counts}; expected at least as many values")
     cases = fit.at(start).cases
     for test, case in enumerate(cases):
         place = f"[[{sections.TEST}]] {test + 1}, {sections.MEASURED}." if len(cases) > 1 else f"[{sections.MEASURED}] "

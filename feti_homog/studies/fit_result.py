@@ -6,18 +6,21 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case import sections
-from feti_homog.studies.estimation import CONFIDENCE, WIDEST, ParameterEstimates, names_of
+from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
 def content(
-    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: str = ""
+    unknowns: Mapping[str, sections.Unknown],
+    data: Sequence[Datum],
+    estimates: ParameterEstimates,
+    teeth: int = 0,
 ) -> dict[str, Any]:
     """Return the content of fit.json without its name; numbers that are not finite are None.
 
-    `teeth` is their number, such as "6 teeth", of a softening law.
+    `teeth` is their number in a softening law, if given.
     """
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
@@ -26,14 +29,9 @@ def content(
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
         faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
-    flat = {k for k, column in enumerate(estimates.jacobian.T) if teeth and not column.any()}
-    faults += [] if misfits else names_of([row for row in estimates.undetermined if {*row} - flat], [*unknowns])
-    faults += [
-        f"[unknown] {name}: steps of {WIDEST * (unknown.upper - unknown.lower):g} change no computed value: with "
-        f"{teeth} the curve is a staircase; more teeth (softening_tolerance) make it smooth"
-        for k, (name, unknown) in enumerate(unknowns.items())
-        if k in flat
-    ]
+    reason = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a staircase; "
+    reason = f"{reason}more teeth (softening_tolerance) make it smooth" if teeth else ""
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], reason)
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"

@@ -65,9 +65,8 @@ class SweepTable:
     documents: Sequence[Document | None]
 
     def __repr__(self) -> str:
-        inputs = ", ".join(self.inputs) or "nothing"
         counts = f"{len(self.finished)} of {len(self.status)} cases done, {len(self.outputs)} outputs"
-        return f"SweepTable({self.name!r}: {counts} over {inputs})"
+        return f"SweepTable({self.name!r}: {counts} over {', '.join(self.inputs)})"
 
     @cached_property
     def points(self) -> list[int]:

@@ -45,7 +45,9 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     picture, axes = _outlined(cell, inks[drawn.phase], look)
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(axes, cell, _inches(picture, attributes), factors if varies else None)
+    longest = max(attributes["width"], attributes["height"])
+    inches = float((picture.get_size_inches() - drawn_cell.MARGINS).min()) / longest
+    write_fibre_numbers(axes, cell, inches, factors if varies else None)
     text = "\nbelow the numbers: strength / that of [interface]" if varies else ""
     axes.set_title(_title(attributes, f"bodies: {drawn.body.max() + 1}") + text)
     present = np.unique(drawn.phase)
@@ -56,12 +58,6 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     plot_helpers.legend_below(picture, entries, 3)
     return picture
-
-
-def _inches(picture: Figure, attributes: Any) -> float:
-    """Return the inches in a picture per length unit."""
-    longest = max(attributes["width"], attributes["height"])
-    return float((picture.get_size_inches() - drawn_cell.MARGINS).min()) / longest
 
 
 def _cyclic_colours(count: int) -> Array:
@@ -80,8 +76,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
     kind, coloured = ("rank", drawn.rank) if len(ranks) > 1 else ("part", drawn.subdomain)
     numbers = np.unique(coloured)
     is_numbered = len(numbers) > IN_LEGEND
-    share = 0.2 if is_numbered else 0.6
-    colours = 1.0 - share + share * _cyclic_colours(coloured.max() + 1)
+    colours = 1.0 - (0.2 if is_numbered else 0.6) * (1.0 - _cyclic_colours(coloured.max() + 1))
     picture, axes = _outlined(cell, colours[coloured], look)
     cuts = decimation.outline_edges(drawn, drawn.subdomain)
     plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 0.8)  # hidden below the outlines
@@ -91,14 +86,14 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
     entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers if not is_numbered]
     entries += [Line2D([], [], color=CUT, label="cut within a body")] * (len(cuts) > len(cell.borders))
     plot_helpers.legend_below(picture, entries)
+    scale = 32 * (picture.get_size_inches() - drawn_cell.MARGINS).min() / np.ptp(drawn.points, axis=0).max()
     outline, middles = cKDTree(drawn.points[np.unique(cuts)]), drawn.points[drawn.triangles].mean(axis=1)
     for part in np.unique(drawn.subdomain) if is_numbered else ():
         triangles = np.flatnonzero(drawn.subdomain == part)
         room = outline.query(middles[triangles])[0]
-        inner, size = triangles[room.argmax()], room.max() * _inches(picture, cell.file.attrs) * 72 / 2.2
+        inner, size = triangles[room.argmax()], min(room.max() * scale, 11.0)
         if size >= LEAST_SIZE:
-            number, size = str(coloured[inner]), min(size, 11.0)
-            axes.text(*middles[inner], number, fontsize=size, ha="center", va="center", clip_on=True)
+            axes.text(*middles[inner], str(coloured[inner]), fontsize=size, ha="center", va="center", clip_on=True)
     return picture
 
 

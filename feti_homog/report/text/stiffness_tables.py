@@ -22,7 +22,7 @@ THERMAL = {
     "thermal_expansion": "thermal expansion",
 }
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
-MESH_ERROR = "Mesh error of the"
+MESH_ERROR = "Mesh error,"
 PAIRS = 2  # constants per line of text
 
 

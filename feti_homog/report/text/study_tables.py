@@ -12,10 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document, axes: str = "") -> str:
-    """Return the fit tables: unknowns, correlations, measured and computed values.
-
-    `axes` explains measured names whose meaning differs in ply axes, for a fit that its bounds keep from the data.
-    """
+    """Return the fit tables: unknowns, correlations, measured values; `axes` explains misread names."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]

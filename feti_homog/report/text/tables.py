@@ -122,8 +122,7 @@ class Table:
                 blocks += ["  " + "    ".join(group) for group in groups]
             elif self.title_in_head:
                 width = -self.columns[0].width
-                rest = head[width:].removeprefix(" " * (len(self.title) - width))  # a long title takes its spaces
-                title, blocks = [], [f"{self.title:<{width}}{rest}", *texts]
+                title, blocks = [], [f"{self.title:<{width}}{head[width:]}", *texts]
             else:
                 blocks += [head, *texts]
         return [line.rstrip() for line in (*title, *blocks, *self.below)]

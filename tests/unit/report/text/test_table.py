@@ -29,17 +29,6 @@ def test_the_error_of_the_mesh_gives_the_digits_of_a_constant():
     assert stiffnesses(document)[0].cells[2] == ["S12", "0.000001", "0.000000", "3.200000"]
 
 
-def test_a_long_title_takes_the_spaces_of_the_next_head():
-    columns = [Column("", -6), Column("E11", 10)]
-    titles = "t", "Mesh error", "Mesh error of the stiffness"
-    lines = [Table(title, columns, [["S11", 1]], title_in_head=True).lines for title in titles]
-    assert [line[0] for line in lines] == [
-        "t            E11",
-        "Mesh error   E11",
-        "Mesh error of the stiffness       E11",
-    ]
-
-
 def test_rows_abreast_and_columns_in_blocks():
     rows = [["a", 1, "+- 2"], ["bc", 3, ""], ["d", 5, "+- 6"]]
     columns = [Column("", -4, indent=0), Column("value", 6, "d"), Column("error", -6, indent=1)]

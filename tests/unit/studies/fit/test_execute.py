@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from feti_homog.case.sections import Unknown
 from feti_homog.studies import fit_result
-from feti_homog.studies.fit import DIFFERENCE, Answer, Evaluations
+from feti_homog.studies.fit import DIFFERENCE, Evaluations
 from feti_homog.studies.predictions import Datum
 from feti_homog.studies.study import Evaluator
 
@@ -22,7 +22,7 @@ class Closed(Evaluations):
 
     def _run(self, name, wanted):
         self.asked = [point for _, point in wanted]
-        return [Answer(WITHOUT_DERIVATIVES, self.fit.function(*point)) for _, point in wanted]
+        return [(WITHOUT_DERIVATIVES, self.fit.function(*point)) for _, point in wanted]
 
 
 def closed(function, **unknowns):
@@ -79,9 +79,11 @@ def test_an_unknown_that_no_step_moves_has_neither_interval_nor_noise():
     """Rounding errors of the values are no derivatives."""
     cases = closed(lambda a: np.array([1.0, 2.0]) * (1.0 + 1e-13 * np.sin(1e6 * a)), a=(30.0, 10.0, 70.0))
     found = cases.estimate()
-    assert found.std[0] == np.inf and cases.steps == {(0, -1): 6.0, (0, 1): 6.0}
-    line = "[unknown] a: steps of 6 change no computed value: with 6 teeth the curve is a staircase; "
-    faults = fit_result.content(cases.fit.unknowns, DATA, found, "6 teeth")["faults"]
+    assert found.std[0] == np.inf and cases.steps == {(0, -1): -6.0, (0, 1): 6.0}
+    line = (
+        "[unknown] a: steps of a tenth of its bounds change no computed value: with 6 teeth the curve is a staircase; "
+    )
+    faults = fit_result.content(cases.fit.unknowns, DATA, found, 6)["faults"]
     assert faults == [f"{line}more teeth (softening_tolerance) make it smooth"]
     assert fit_result.content(cases.fit.unknowns, DATA, found)["faults"] == [
         "[unknown] a: no measured value depends on it"
