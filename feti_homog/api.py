@@ -75,8 +75,7 @@ def run_sweep(
 ) -> sweep_table.SweepTable:
     """Run the sweep cases, given as a file or document.  Collective.
 
-    Returns the table of the cases on every rank; `pandas.DataFrame({**table.inputs, **table.outputs})` has a row a
-    case.  The same call resumes an interrupted sweep in `out`.
+    Returns the table of the cases on every rank.  The same call resumes an interrupted sweep in `out`.
 
     Args:
         ranks_per_case: ranks of a case (default: all); groups of this size work concurrently.

@@ -82,10 +82,8 @@ def _result_folder(arguments: argparse.Namespace) -> Path:
     """Return the result folder in the arguments.  Raises CaseError for a file, no folder, or the folder of a study."""
     directory: Path = arguments.directory
     if not os.path.isdir(directory):
-        is_file = os.path.exists(directory)
-        raise CaseError(
-            f"{directory}: {'expected the folder of a result, not a file' if is_file else 'no such folder'}"
-        )
+        fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"
+        raise CaseError(f"{directory}: {fault}")
     is_result = os.path.exists(directory / result_json.NAME)
     names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name) and not is_result]
     if names == [case_folders.INDEX_FILE]:

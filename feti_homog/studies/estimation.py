@@ -5,7 +5,7 @@ J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covarian
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -137,18 +137,12 @@ def estimate(
         max_nfev=MOST_EVALUATIONS,
     )
     x, derivatives = minimum.x * size, minimum.jac * std[:, None] / size
-    return summarize(x, minimum.fun * std + y, measured, derivatives, bounds,
-                     evaluations=minimum.nfev, converged=bool(minimum.success))  # fmt: skip
+    estimates = summarize(x, minimum.fun * std + y, measured, derivatives, bounds)
+    return replace(estimates, evaluations=minimum.nfev, converged=bool(minimum.success))
 
 
 def summarize(
-    x: Float,
-    computed: Float,
-    measured: tuple[Float, Float],
-    derivatives: Float,
-    bounds: tuple[Float, Float],
-    evaluations: int = 0,
-    converged: bool = True,
+    x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
     """Gather estimates x (n,) with the computed values (m,) and derivatives (m, n) at x."""
     y, std = measured
@@ -159,13 +153,15 @@ def summarize(
     at_bound = np.where(x >= upper - margin, 1, np.where(x <= lower + margin, -1, 0))
     s = np.pad(s, (0, len(x) - len(s)))
     return ParameterEstimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
-                     singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
+                     singular_values=s, directions=V, evaluations=0, converged=True)  # fmt: skip
 
 
-def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], alone: str = "") -> list[str]:
+def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0) -> list[str]:
     """Return a message for each direction that the data do not determine."""
-    alone = alone or "no measured value depends on it"
-    reasons = {True: alone, False: "the measured values do not determine them together"}
+    reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
+    if teeth:  # of a softening law
+        reasons[True] = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a "
+        reasons[True] += "staircase; more teeth (softening_tolerance) make it smooth"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 

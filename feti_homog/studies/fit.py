@@ -144,7 +144,6 @@ class Evaluations:
         answers: on rank 0 result.json of all tests by unknowns, without evaluations that failed.
         folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
         computed: on rank 0 the computed data (m,) by unknowns, also at the ends of differences.
-        steps: on rank 0 the last steps of differences by number of the unknown, and side.
     """
 
     fit: Fit
@@ -152,7 +151,6 @@ class Evaluations:
     answers: dict[Point, list[Mapping[str, Any]]] = field(default_factory=dict)
     folders: dict[Point, str] = field(default_factory=dict)
     computed: dict[Point, Float] = field(default_factory=dict)
-    steps: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
         """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
@@ -174,9 +172,10 @@ class Evaluations:
 
     def _search(self) -> estimation.ParameterEstimates:
         """Search from the start; after a misfit or a fault, also from the best of `STARTS` points.  On rank 0."""
-        unknowns, estimates = [*self.fit.unknowns.values()], None
+        estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
-        start, low, high = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
+        rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
+        start, low, high = np.array(rows).T
 
         def squares(point: Point) -> float:
             return float(np.square((self.computed[point] - y) / std).sum())
@@ -193,13 +192,10 @@ class Evaluations:
             return estimates
         if not self.evaluator.quiet:
             standard_streams.say("remark: the search from the start fails; the next begins at the best further point:")
-        box = [
-            Axis(path, ends=(u.lower, u.upper), log=u.lower > 0.0)
-            for path, u in zip(self.fit.paths, unknowns, strict=True)
-        ]
-        for point in [start, *sampled_points(box, sections.SweepSection(samples=STARTS - 1))]:
+        box = [Axis(path, ends=(a, b), log=a > 0.0) for path, a, b in zip(self.fit.paths, low, high, strict=True)]
+        for point in sampled_points(box, sections.SweepSection(samples=STARTS - 1)):
             with suppress(CaseError, ConvergenceError):
-                self.values(np.array([*point.values()]) if isinstance(point, dict) else point)
+                self.values(np.array([*point.values()]))
         # Without any sound point the search has the fault of the start again.
         return search(np.array(min(self.computed, key=squares, default=start)))
 
@@ -212,8 +208,7 @@ class Evaluations:
             self.answers[key] = [document for document, _ in answers]
             self.computed[key] = np.concatenate([values for _, values in answers])
             if not self.evaluator.quiet:
-                pairs = zip(self.fit.unknowns, key, strict=True)
-                numbers = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
+                numbers = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.fit.unknowns, key, strict=True))
                 standard_streams.say(f"evaluation {len(self.folders)}: {numbers}")
         return self.computed[key]
 
@@ -221,7 +216,7 @@ class Evaluations:
         """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
 
         A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
-        twice the step, up to `estimation.WIDEST`.  The next differences begin with half of the last steps.
+        twice the step, up to `estimation.WIDEST`.
         """
         key, centre = _rounded(x), self.values(x)
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
@@ -230,10 +225,8 @@ class Evaluations:
             J[self.fit.rows_of(test), k] = np.nan if column is None else column
         bounds = [(unknown.lower, unknown.upper) for unknown in unknowns.values()]
         widths, noise = np.ptp(bounds, axis=1), SAME_VALUE * (np.abs(centre) + [datum.std for datum in self.fit.data])
-        steps = {
-            (k, side): side * max(DIFFERENCE * (abs(key[k]) or widths[k]), abs(self.steps.get((k, side), 0.0)) / 2)
-            for k, side in product(np.flatnonzero(np.isnan(J).any(axis=0)).tolist(), (-1, 1))
-        }
+        inexact = np.flatnonzero(np.isnan(J).any(axis=0)).tolist()
+        steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
 
         def end(k: int, step: float) -> Point:
             """Return the point a step of unknown k away, within the bounds."""
@@ -245,18 +238,16 @@ class Evaluations:
         self.computed |= {point: np.concatenate([next(answers)[1] for _ in tests]) for point in ends}
         for (k, side), widest in ((pair, estimation.WIDEST * widths[pair[0]]) for pair in steps):
             with suppress(CaseError, ConvergenceError):
-                while (
-                    abs(step := steps[k, side]) < widest
-                    and (np.abs(self.computed[end(k, step)] - centre) <= noise).all()
+                while abs(step := steps[k, side]) < widest and np.all(
+                    abs(self.computed[end(k, step)] - centre) <= noise
                 ):
                     self.values(np.array(end(k, wider := side * min(2.0 * abs(step), widest))))
                     steps[k, side] = wider
-        for k in {k for k, _ in steps}:
+        for k in inexact:
             low, high = (end(k, steps[k, side]) for side in (-1, 1))
             change = self.computed[high] - self.computed[low]
             slope = change * (np.abs(change) > noise).any() / (high[k] - low[k])
             J[:, k] = np.where(np.isnan(J[:, k]), slope, J[:, k])
-        self.steps = steps
         return J
 
     def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:

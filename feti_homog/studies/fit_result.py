@@ -13,15 +13,9 @@ HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
 def content(
-    unknowns: Mapping[str, sections.Unknown],
-    data: Sequence[Datum],
-    estimates: ParameterEstimates,
-    teeth: int = 0,
+    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: int = 0
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name; numbers that are not finite are None.
-
-    `teeth` is their number in a softening law, if given.
-    """
+    """Return the content of fit.json without its name; numbers that are not finite are None.  `teeth` as `names_of`."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
     if misfits and estimates.undetermined:
@@ -29,9 +23,7 @@ def content(
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
         faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
-    reason = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a staircase; "
-    reason = f"{reason}more teeth (softening_tolerance) make it smooth" if teeth else ""
-    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], reason)
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], teeth)
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"

@@ -68,8 +68,7 @@ def _cyclic_colours(count: int) -> Array:
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
-    A subdomain across several materials counts once for each body.  More than `IN_LEGEND` colours, which nobody tells
-    apart, are pale, with numbers on the subdomains.
+    A subdomain across several materials counts once a body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
