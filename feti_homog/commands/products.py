@@ -79,13 +79,18 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder in the arguments.  Raises CaseError for a file, or the sweep folder."""
+    """Return the result folder in the arguments.  Raises CaseError for a file, no folder, or the folder of a study."""
     directory: Path = arguments.directory
-    if os.path.isfile(directory):
-        raise CaseError(f"{directory}: expected the folder of a result, not a file")
-    if os.path.exists(directory / case_folders.INDEX_FILE) and not os.path.exists(directory / result_json.NAME):
+    if not os.path.isdir(directory):
+        fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"
+        raise CaseError(f"{directory}: {fault}")
+    is_result = os.path.exists(directory / result_json.NAME)
+    names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name) and not is_result]
+    if names == [case_folders.INDEX_FILE]:
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` draws a sweep"
         )
+    if names:
+        raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")
     return directory

@@ -102,12 +102,14 @@ def case_remarks(case: Case) -> tuple[str, ...]:
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
         return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
+    if case.analysis.type == "envelope" and cell.order == 1:
+        lines = ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
         levels = getattr(law_of_sections(case.interfaces, np.zeros(0, np.int64)), "levels", ())
         remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "
-        lines = (f"{remark}{len(levels) - 1} teeth a bond",) if len(levels) else ()
+        lines += (f"{remark}{len(levels) - 1} teeth a bond",) if len(levels) else ()
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
     fraction = cell.matched.fibre_fraction

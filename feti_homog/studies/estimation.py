@@ -5,7 +5,7 @@ J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covarian
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ CONFIDENCE = 0.95
 LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 # The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
-STEP, MOST_EVALUATIONS = 1e-8, 60
+WIDEST = 0.1  # longest step of differences without effect, relative to the width of the bounds
+STEP, MOST_EVALUATIONS = 1e-5, 60  # of the unknowns, far below 1 % differences and std
 Model = Callable[[Float], Float]
 
 
@@ -140,18 +141,12 @@ def estimate(
         max_nfev=MOST_EVALUATIONS,
     )
     x, derivatives = minimum.x * size, minimum.jac * std[:, None] / size
-    return summarize(x, minimum.fun * std + y, measured, derivatives, bounds,
-                     evaluations=minimum.nfev, converged=bool(minimum.success))  # fmt: skip
+    estimates = summarize(x, minimum.fun * std + y, measured, derivatives, bounds)
+    return replace(estimates, evaluations=minimum.nfev, converged=bool(minimum.success))
 
 
 def summarize(
-    x: Float,
-    computed: Float,
-    measured: tuple[Float, Float],
-    derivatives: Float,
-    bounds: tuple[Float, Float],
-    evaluations: int = 0,
-    converged: bool = True,
+    x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
     """Gather estimates x (n,) with the computed values (m,) and derivatives (m, n) at x."""
     y, std = measured
@@ -162,12 +157,15 @@ def summarize(
     at_bound = np.where(x >= upper - margin, 1, np.where(x <= lower + margin, -1, 0))
     s = np.pad(s, (0, len(x) - len(s)))
     return ParameterEstimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
-                     singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
+                     singular_values=s, directions=V, evaluations=0, converged=True)  # fmt: skip
 
 
-def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
+def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0) -> list[str]:
     """Return a message for each direction that the data do not determine."""
     reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
+    if teeth:  # of a softening law
+        reasons[True] = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a "
+        reasons[True] += "staircase; more teeth (softening_tolerance) make it smooth"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 
@@ -177,9 +175,9 @@ def _sizes(x: Float) -> Float:
 
 
 def fit_document(
-    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates
+    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: int = 0
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name; numbers that are not finite are None."""
+    """Return the content of fit.json without its name; numbers that are not finite are None.  `teeth` as `names_of`."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
     if misfits and estimates.undetermined:
@@ -187,7 +185,7 @@ def fit_document(
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
         faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
-    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], teeth)
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"

@@ -30,6 +30,7 @@ from feti_homog.typing import Float
 
 STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
+SAME_VALUE = 1e-9  # relative difference of computed values by rounding, and by the tolerance of the solver
 Point = tuple[float, ...]
 
 
@@ -115,30 +116,22 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates)}
+            teeth = next((bond.teeth for bond in self.first_cases().cases[0].interfaces if bond.teeth), 0)
+            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates, teeth)}
             rows = [[datum[name] for name in estimation.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([estimation.HEAD, *rows]))
-            results = [answer.document for answer in evaluations.answers[_rounded(estimates.x)]]
-            pictures.draw_fit(evaluator.directory / "fit.png", document, results)
+            pictures.draw_fit(evaluator.directory / "fit.png", document, evaluations.answers[_rounded(estimates.x)])
             return document
 
         return mpi_errors.on_root(evaluator.comm, write, evaluations.estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
-        return study_tables.fit_text(document)
+        return study_tables.fit_text(document, self.axes())
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:
     """Round unknowns to the digits that the case documents have."""
     return tuple(map(rounded, x))
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The result.json of a test, and the computed values (m,) of the data of the test."""
-
-    document: Mapping[str, Any]
-    values: Float
 
 
 @dataclass
@@ -148,14 +141,16 @@ class Evaluations:
     Rank 0 runs the search and asks for evaluations; all ranks compute.
 
     Attributes:
-        answers: on rank 0 the results of all tests by unknowns, without evaluations that failed.
+        answers: on rank 0 result.json of all tests by unknowns, without evaluations that failed.
         folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
+        computed: on rank 0 the computed data (m,) by unknowns, also at the ends of differences.
     """
 
     fit: Fit
     evaluator: Evaluator
-    answers: dict[Point, list[Answer]] = field(default_factory=dict)
+    answers: dict[Point, list[Mapping[str, Any]]] = field(default_factory=dict)
     folders: dict[Point, str] = field(default_factory=dict)
+    computed: dict[Point, Float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
         """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
@@ -177,17 +172,19 @@ class Evaluations:
 
     def _search(self) -> estimation.ParameterEstimates:
         """Search from the start; after a misfit or a fault, also from the best of `STARTS` points.  On rank 0."""
-        unknowns, estimates = [*self.fit.unknowns.values()], None
+        estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
-        start, low, high = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
+        rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
+        start, low, high = np.array(rows).T
+
+        def squares(point: Point) -> float:
+            return float(np.square((self.computed[point] - y) / std).sum())
 
         def search(x: Float) -> estimation.ParameterEstimates:
-            return estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
-
-        def squares(x: Float) -> float:
-            with suppress(CaseError, ConvergenceError):
-                return float(np.square((self.values(x) - y) / std).sum())
-            return np.inf
+            estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
+            best = min(self.computed, key=squares)
+            is_best = squares(best) >= (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals)
+            return replace(estimates, evaluations=len(self.answers)) if is_best else search(np.array(best))
 
         with suppress(CaseError):
             estimates = search(start)
@@ -195,61 +192,72 @@ class Evaluations:
             return estimates
         if not self.evaluator.quiet:
             standard_streams.say("remark: the search from the start fails; the next begins at the best further point:")
-        box = [
-            Axis(path, ends=(u.lower, u.upper), log=u.lower > 0.0)
-            for path, u in zip(self.fit.paths, unknowns, strict=True)
-        ]
-        further = sampled_points(box, sections.SweepSection(samples=STARTS - 1))
-        best = min([start, *(np.array([*point.values()]) for point in further)], key=squares)
-        if estimates is None or squares(best) < estimates.residuals @ estimates.residuals:
-            estimates = search(best)  # without any sound point this has the fault of the start again
-        return replace(estimates, evaluations=len(self.answers))
+        box = [Axis(path, ends=(a, b), log=a > 0.0) for path, a, b in zip(self.fit.paths, low, high, strict=True)]
+        for point in sampled_points(box, sections.SweepSection(samples=STARTS - 1)):
+            with suppress(CaseError, ConvergenceError):
+                self.values(np.array([*point.values()]))
+        # Without any sound point the search has the fault of the start again.
+        return search(np.array(min(self.computed, key=squares, default=start)))
 
     def values(self, x: Float) -> Float:
         """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
-            self.answers[key] = self._ask(folder, [(test, key) for test in range(len(self.fit.tests))])
+            answers = self._ask(folder, [(test, key) for test in range(len(self.fit.tests))])
+            self.answers[key] = [document for document, _ in answers]
+            self.computed[key] = np.concatenate([values for _, values in answers])
             if not self.evaluator.quiet:
-                pairs = zip(self.fit.unknowns, key, strict=True)
-                numbers = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
+                numbers = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.fit.unknowns, key, strict=True))
                 standard_streams.say(f"evaluation {len(self.folders)}: {numbers}")
-        return np.concatenate([answer.values for answer in self.answers[key]])
+        return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0."""
-        key, names = _rounded(x), [*self.fit.unknowns]
-        J = np.zeros((len(self.values(x)), len(key)))
-        missing = list[tuple[int, int]]()
-        for (test, answer), (k, name) in product(enumerate(self.answers[key]), enumerate(names)):
-            column = exact_derivatives(answer.document, self.fit.data_of(test), name)
-            if column is None:
-                missing.append((test, k))
-            else:
-                J[self.fit.rows_of(test), k] = column
-        if missing:
-            places = list[tuple[int, Point]]()
-            for test, k in missing:  # a step down and a step up, within the bounds
-                unknown = [*self.fit.unknowns.values()][k]
-                step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
-                ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
-                places += [(test, _rounded([*key[:k], end, *key[k + 1 :]])) for end in ends]
-            answers = self._ask(self.folders[key].replace("evaluation", "differences"), places)
-            for n, (test, k) in enumerate(missing):
-                (below, above), ((_, low), (_, high)) = answers[2 * n : 2 * n + 2], places[2 * n : 2 * n + 2]
-                J[self.fit.rows_of(test), k] = (above.values - below.values) / (high[k] - low[k])
+        """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
+
+        A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
+        twice the step, up to `estimation.WIDEST`.
+        """
+        key, centre = _rounded(x), self.values(x)
+        J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
+        for test, (k, name) in product(tests, enumerate(unknowns)):
+            column = exact_derivatives(self.answers[key][test], self.fit.data_of(test), name)
+            J[self.fit.rows_of(test), k] = np.nan if column is None else column
+        bounds = [(unknown.lower, unknown.upper) for unknown in unknowns.values()]
+        widths, noise = np.ptp(bounds, axis=1), SAME_VALUE * (np.abs(centre) + [datum.std for datum in self.fit.data])
+        inexact = np.flatnonzero(np.isnan(J).any(axis=0)).tolist()
+        steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
+
+        def end(k: int, step: float) -> Point:
+            """Return the point a step of unknown k away, within the bounds."""
+            return _rounded([*key[:k], np.clip(key[k] + step, *bounds[k]), *key[k + 1 :]])
+
+        ends = [end(k, step) for (k, _), step in steps.items()]
+        name = self.folders[key].replace("evaluation", "differences")
+        answers = iter(self._ask(name, [(test, point) for point in ends for test in tests]) if ends else ())
+        self.computed |= {point: np.concatenate([next(answers)[1] for _ in tests]) for point in ends}
+        for (k, side), widest in ((pair, estimation.WIDEST * widths[pair[0]]) for pair in steps):
+            with suppress(CaseError, ConvergenceError):
+                while abs(step := steps[k, side]) < widest and np.all(
+                    abs(self.computed[end(k, step)] - centre) <= noise
+                ):
+                    self.values(np.array(end(k, wider := side * min(2.0 * abs(step), widest))))
+                    steps[k, side] = wider
+        for k in inexact:
+            low, high = (end(k, steps[k, side]) for side in (-1, 1))
+            change = self.computed[high] - self.computed[low]
+            slope = change * (np.abs(change) > noise).any() / (high[k] - low[k])
+            J[:, k] = np.where(np.isnan(J[:, k]), slope, J[:, k])
         return J
 
-    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
         self.evaluator.comm.bcast((name, places))
         return self._run(name, places)
 
-    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
         """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]
         pairs = zip(documents, data, strict=False)  # other ranks have no results
-        answers = mpi_errors.on_root_only(comm, lambda: [Answer(r, predicted(r, y)) for r, y in pairs])
-        return answers or []
+        return mpi_errors.on_root_only(comm, lambda: [(r, predicted(r, y)) for r, y in pairs]) or []

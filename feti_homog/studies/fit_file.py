@@ -31,14 +31,14 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
     if sections.SWEEP in document:
         reader.faults.append(f"[{sections.SWEEP}]: a fit has no sweep; expected [[{sections.TEST}]] for each test")
     assignments, data = reader.tests(measured, tests, {*unknowns})
-    if unknowns and len(data) < len(unknowns) and not reader.faults:
-        counts = f"{len(unknowns)} unknowns, {len(data)} measured values"
-        reader.faults.append(f"[{sections.UNKNOWN}]: {counts}; expected at least as many values")
     if reader.faults:
         raise CaseError(*reader.faults)
     named = {".".join(path): unknown for path, unknown in unknowns.items()}
     fit = Fit(document, folder, named, [*unknowns], assignments, data)
     start, faults = [unknown.start for unknown in unknowns.values()], list[str]()
+    if len(data) < len(unknowns):
+        counts = f"{len(unknowns)} unknowns, {len(data)} measured value{'s' * (len(data) > 1)}"
+        faults.append(f"[{sections.UNKNOWN}]: {counts}; expected at least as many values")
     cases = fit.at(start).cases
     for test, case in enumerate(cases):
         place = f"[[{sections.TEST}]] {test + 1}, {sections.MEASURED}." if len(cases) > 1 else f"[{sections.MEASURED}] "

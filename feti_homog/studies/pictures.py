@@ -151,7 +151,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]
-    count = bool(single) + bool(points)
+    count, unit = bool(single) + bool(points), plot_helpers.stress_unit(results[0]["case"]) if results else ""
     figure = Figure(figsize=(6.5 * count, 4.5), layout="constrained")
     panels = figure.subplots(1, count, squeeze=False)[0]
     if single:
@@ -164,7 +164,9 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
         labels = [f"{row['name']} {row['value']:.4g} / {row['computed']:.4g}" for row in single]
         axes.set_yticks(place, [plot_helpers.plain(label) for label in labels])
         axes.invert_yaxis()
-        axes.set(xlabel="(computed - measured) / std", title="measured / computed")
+        axes.set(xlabel="(computed - measured) / std")
+        axes.text(-0.02, 1.02, f"measured / computed {unit}".rstrip(), ha="right", transform=axes.transAxes)
+        axes.text(0.0, 1.02, "grey: 95 %", ha="center", transform=axes.get_xaxis_transform())
         if len(np.unique(tests)) > 1 and not points:
             plot_helpers.legend_below(figure, axes.get_legend_handles_labels()[0])
     if points:
@@ -182,9 +184,11 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
                 x, computed = np.sign(x[-1]) * curve[:, -1], curve[:, stresses.index(name)]
             panels[-1].plot(x, computed, color=colour, linewidth=1.2, label=f"test {test}, computed")
         symbols = [f"${plot_helpers.SYMBOLS[points[0][name]]}$" for name in ("strain_name", "name")]
-        unit = plot_helpers.stress_unit(results[points[0]["test"] - 1]["case"]) if results else ""
         panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())
         panels[-1].locator_params(axis="x", nbins=6)
         plot_helpers.finish_curves(panels[-1])
-    figure.suptitle(f"{plot_helpers.plain(document['name'])}: computed and measured")
+    title = f"{document['name']}: computed and measured"
+    for name, number in document.get("unknowns", {}).items():
+        title += f"\n{name} = {number['estimate']:.5g}" + (f" ± {number['std']:.2g}" if number["std"] else "")
+    figure.suptitle(plot_helpers.plain(title))
     return figure

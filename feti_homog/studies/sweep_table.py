@@ -41,9 +41,9 @@ class Statistics:
         return cls(count.astype(float), mean, std, student.ppf((1 + CONFIDENCE) / 2, several - 1) * std / several**0.5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SweepTable:
-    """The table of a sweep, with a row for each case.
+    """The table of a sweep, with a row for each case; see `pandas.DataFrame({**table.inputs, **table.outputs})`.
 
     Attributes:
         name, stress_unit: as in the sweep.
@@ -63,6 +63,10 @@ class SweepTable:
     inputs: Mapping[str, Sequence[Any]]
     outputs: Mapping[str, Float]
     documents: Sequence[Document | None]
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.finished)} of {len(self.status)} cases done, {len(self.outputs)} outputs"
+        return f"SweepTable({self.name!r}: {counts} over {', '.join(self.inputs)})"
 
     @cached_property
     def points(self) -> list[int]:

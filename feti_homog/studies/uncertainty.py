@@ -26,7 +26,7 @@ from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
-from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty
+from feti_homog.studies.uncertain_numbers import EXPECTED, SECTIONS, Uncertainty, number_at, read_uncertainty
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
@@ -173,9 +173,10 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 
 def is_study(values: Mapping[str, Any]) -> bool:
-    """Return whether a document has uncertain numbers."""
-    document = toml_files.to_document(values)
-    return sections.UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
+    """Return whether a document has uncertain numbers, sound or faulty."""
+    document, faults = toml_files.to_document(values), list[str]()
+    is_named = sections.UNCERTAINTY in document or bool(read_uncertainty(document, faults).std)
+    return is_named or any(line.endswith(EXPECTED) for line in faults)
 
 
 def _data(documents: Documents) -> list[Datum]:

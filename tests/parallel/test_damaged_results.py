@@ -105,7 +105,7 @@ OF_PLOT = {
         lambda out: other(out, "result.json"),
         "result.h5: it is damaged, or of another run",
     ),
-    "no folder": (shutil.rmtree, "result.h5: it is missing; run the case again"),
+    "no folder": (shutil.rmtree, "out: no such folder"),
     "unfinished": (
         lambda out: [(out / name).rename(out / f"{name}.vm.1.part") for name in ("result.json", "result.h5")],
         "result.h5: it is missing; run the case again",

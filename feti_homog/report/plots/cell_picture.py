@@ -23,7 +23,7 @@ from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
 from feti_homog.typing import Array, Document
 
-IN_LEGEND = 12  # most phases in the legend, which would otherwise cover the cell
+IN_LEGEND = 10  # most phases or parts in the legend, which would otherwise cover the cell
 MATRIX = "0.87"
 TURN = 0.618  # golden section: as a fraction of the colour circle, it never repeats a colour
 LEAST_SIZE = 3.0  # points; smallest font size
@@ -68,23 +68,32 @@ def _cyclic_colours(count: int) -> Array:
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
-    A subdomain across several materials counts once for each body.
+    A subdomain across several materials counts once a body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
     kind, coloured = ("rank", drawn.rank) if len(ranks) > 1 else ("part", drawn.subdomain)
-    colours = 0.4 + 0.6 * _cyclic_colours(coloured.max() + 1)
+    numbers = np.unique(coloured)
+    is_numbered = len(numbers) > IN_LEGEND
+    colours = 1.0 - (0.2 if is_numbered else 0.6) * (1.0 - _cyclic_colours(coloured.max() + 1))
     picture, axes = _outlined(cell, colours[coloured], look)
     cuts = decimation.outline_edges(drawn, drawn.subdomain)
     plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 0.8)  # hidden below the outlines
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.9)
     text = f"bodies: {drawn.body.max() + 1}, parts: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
     axes.set_title(_title(cell.file.attrs, text))
-    numbers = np.unique(coloured)
-    entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers[:5]]
-    entries += [Patch(facecolor="none", label=f"to {kind} {numbers[-1]}")] * (len(numbers) > 5)
+    entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers if not is_numbered]
     entries += [Line2D([], [], color=CUT, label="cut within a body")] * (len(cuts) > len(cell.borders))
-    plot_helpers.legend_below(picture, entries, 3)
+    plot_helpers.legend_below(picture, entries)
+    scale = 32 * (picture.get_size_inches() - drawn_cell.MARGINS).min() / np.ptp(drawn.points, axis=0).max()
+    outline, middles = cKDTree(drawn.points[np.unique(cuts)]), drawn.points[drawn.triangles].mean(axis=1)
+    for part in np.unique(drawn.subdomain) if is_numbered else ():
+        triangles = np.flatnonzero(drawn.subdomain == part)
+        room = outline.query(middles[triangles])[0]
+        inner, size = triangles[room.argmax()], min(room.max() * scale, 11.0)
+        if size >= LEAST_SIZE:
+            x, y = middles[inner]
+            axes.text(x, y, str(coloured[inner]), fontsize=size, ha="center", va="center", clip_on=True)
     return picture
 
 

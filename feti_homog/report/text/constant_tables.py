@@ -25,7 +25,7 @@ THERMAL = {
     "thermal_expansion": "thermal expansion",
 }
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
-MESH_ERROR = "Mesh error, estimated"
+MESH_ERROR = "Mesh error,"
 PAIRS = 2  # constants per line of text
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
 SHOWN = {
@@ -44,7 +44,7 @@ def stiffnesses(document: Document) -> list[Table]:
             axes = "" if len(document[key]) == len(voigt.STRAINS) else f", {engineering_constants.CELL_AXES}"
             tables.append(_matrix(f"{title}{axes}{label}", document[key]))
         if errors.get(key) is not None:
-            tables.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
+            tables.append(_matrix(f"{MESH_ERROR} stiffness{label}", errors[key], ".1e"))
     return tables
 
 
@@ -52,7 +52,7 @@ def conductivity(document: Document) -> list[Table]:
     """Return tables of k^ef and its mesh errors, with closed forms and bounds for the directions across."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
     title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
-    matrices = (title, k, ".8g"), (MESH_ERROR, errors.get("effective_conductivity"), ".1e")
+    matrices = (title, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
     tables = [
         Table(title, [Column("", -6), *(Column(name, 16, form) for name in names)],
               [[name, *row] for name, row in zip(names, np.array(matrix).tolist(), strict=True)])

@@ -11,8 +11,8 @@ FIRST, NUMBERS = tables.Column("", -38), ("value", "std", "computed", "residual"
 LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
-def fit_text(document: Document) -> str:
-    """Return the fit tables: unknowns, correlations, and measured and computed values."""
+def fit_text(document: Document, axes: str = "") -> str:
+    """Return the fit tables: unknowns, correlations, measured values; `axes` explains misread names."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
@@ -44,6 +44,7 @@ def fit_text(document: Document) -> str:
     if ends and worst > MOST_DEVIATIONS:
         last.append(
             f"Remark: the fit ends with {', '.join(ends)} bound, and {label} is {worst:.3g} standard deviations off"
+            f"{'; ' * bool(axes)}{axes}"
         )
     return "\n\n".join(["", *("\n".join(table.lines) for table in printed), *last])
 

@@ -29,6 +29,14 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_onsets_by_linear_elements_have_a_remark(order):
+    content = tomllib.loads(VALID_CASES["base"]) | {"interface": {"normal_strength": 1.0}}
+    content |= {"envelope": {"plane": ["S11", "S22"]}, "analysis": {"type": "envelope", "plane": "strain"}}
+    content["cell"]["order"] = order
+    assert ["onsets err more" in line for line in case_remarks(Case.parse(content))] == [True] * (order == 1)
+
+
 @pytest.mark.parametrize("key", [{"teeth": 3}, {"softening_tolerance": 0.15}, {}], ids=str)
 def test_teeth_that_exceed_the_peak_are_a_warning_however_they_are_chosen(key):
     """W_0 = N^2 / (2 K): the opening of tooth j is rho^(j / n) of the onset, rho = 2 K G / N^2; n follows from rho."""

@@ -1,6 +1,7 @@
 """Uncertain numbers of a document: read, refused with a line, and written so that the same ones are read again."""
 
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from feti_homog.case.cases import Case
 from feti_homog.case.sections import UNCERTAINTY
 from feti_homog.case.toml_files import with_values
 from feti_homog.errors import CaseError
-from feti_homog.studies.uncertain_numbers import Uncertainty, number_at, read_uncertainty
+from feti_homog.studies import uncertainty as scatter
+from feti_homog.studies.uncertain_numbers import EXPECTED, Uncertainty, number_at, read_uncertainty
 
 UNCERTAIN = (
     ("young = 88.0", "young = {mean = 88.0, cv = 0.05}"),
@@ -101,6 +103,15 @@ def test_faults_have_their_line(edits, end, line):
     with pytest.raises(CaseError) as error:
         read(document)
     assert any(fault.startswith(line) for fault in error.value.faults), error.value.faults
+
+
+@pytest.mark.parametrize("entry", ['{mean = 88.0, std = "5%"}', "{mean = 88.0, cov = 0.05}"])
+def test_a_faulty_number_hides_no_study_and_the_sound_ones_are_not_blamed(entry):
+    document = tomllib.loads(changed(("young = 88.0", f"young = {entry}"), UNCERTAIN[1]))
+    assert scatter.is_study(document)
+    with pytest.raises(CaseError) as error:
+        scatter.parse(document, Path())
+    assert error.value.faults == (f"[material.matrix] young = {entry}: {EXPECTED}",)
 
 
 def test_impossible_correlations_are_refused():

@@ -130,6 +130,17 @@ def test_a_missing_state_is_named(results):
         read_state(results("contact"), 99)
 
 
+def test_a_result_that_the_program_has_open_is_one_line(results):
+    path = results("contact") / "result.h5"
+    with (
+        h5py.File(path),
+        pytest.raises(CaseError, match=r"^cannot read .*result.h5: it is open in this program: close"),
+    ):
+        read_state(path.parent)
+    with h5py.File(path, locking=False):
+        assert len(read_state(path.parent).points)
+
+
 def test_a_result_without_fields_is_one_line(tmp_path):
     with pytest.raises(CaseError, match=r"^cannot read .*result.h5: it is missing; run the case again$"):
         read_state(tmp_path)

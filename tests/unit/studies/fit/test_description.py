@@ -55,7 +55,7 @@ def faults(text: str, folder: Path = Path()) -> tuple[str, ...]:
         (f'{UNKNOWN}[measured]\ncurve = {{file = "none.csv", std = 0.1}}\n',
          '[measured] curve.file = "none.csv": No such file or directory'),
         (UNKNOWN + 'material.matrix.young = {start = 1.0, lower = 0.5, upper = 2.0}\n' + MEASURED,
-         "[unknown]: 2 unknowns, 1 measured values; expected at least as many values"),
+         "[unknown]: 2 unknowns, 1 measured value; expected at least as many values"),
         (f"{UNKNOWN}[[test]]\nmaterial.fibre.young = 3.0\n[test.measured]\nC11 = {{value = 3.0, std = 0.1}}\n",
          "[[test]] 1, material.fibre.young: it is an unknown of [unknown]"),
         (f"{UNKNOWN}[[test]]\ncell.fibre_fraction = 0.3\n",
@@ -66,6 +66,14 @@ def faults(text: str, folder: Path = Path()) -> tuple[str, ...]:
 )  # fmt: skip
 def test_faults_have_their_line(text, line):
     assert faults(BASE + text) == (line,)
+
+
+def test_few_values_hide_no_misspelt_name():
+    text = (
+        f"{UNKNOWN}material.matrix.young = {{start = 1.0, lower = 0.5, upper = 2.0}}\n{MEASURED.replace('C11', 'C44')}"
+    )
+    count, name = faults(BASE + text)
+    assert "2 unknowns, 1 measured value;" in count and name.startswith("[measured] C44: the analysis does not give it")
 
 
 def test_a_case_file_with_unknowns_is_none_of_a_run():
@@ -101,6 +109,8 @@ def test_tests_are_changes_of_one_case(tmp_path):
          "[measured] curve: expected strains of the sign of the path, which ends at 0.1"),
         ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.11, 2.0\n",
          "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
+        ("strain = [0.1, 0.0, 0.0]", "E11, S11\n10.0, 1.0\n",
+         "[measured] curve: a strain of 10 is beyond the end of the path at 0.1; in per cent?"),
         ("waypoints = [{S11 = -1.0, S22 = 0.0, S12 = 0.0}]", "E11, S11\n0.01, 1.0\n",
          "[measured] curve: expected strains of the sign of the path, which ends at -1"),
         ("waypoints = [{S11 = 1.0}, {S11 = 0.0}]", "E11, S11\n0.01, 1.0\n",

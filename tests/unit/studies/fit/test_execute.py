@@ -8,7 +8,8 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.case.sections import Unknown
-from feti_homog.studies.fit import DIFFERENCE, Answer, Evaluations
+from feti_homog.studies import estimation
+from feti_homog.studies.fit import DIFFERENCE, Evaluations
 from feti_homog.studies.predictions import Datum
 from feti_homog.studies.study import Evaluator
 
@@ -21,7 +22,7 @@ class Closed(Evaluations):
 
     def _run(self, name, wanted):
         self.asked = [point for _, point in wanted]
-        return [Answer(WITHOUT_DERIVATIVES, self.fit.function(*point)) for _, point in wanted]
+        return [(WITHOUT_DERIVATIVES, self.fit.function(*point)) for _, point in wanted]
 
 
 def closed(function, **unknowns):
@@ -56,3 +57,34 @@ def test_differences_are_divided_by_the_way_between_their_cases(x):
     step = DIFFERENCE * (x or 6.0)
     assert ends == pytest.approx([max(lower, x - step), min(5.0, x + step)])
     assert [point[1] for point in cases.asked[2:]] == pytest.approx([1.0 - DIFFERENCE, 1.0])
+
+
+@pytest.mark.parametrize("start", [42.0, 30.0, 9.0])
+def test_data_that_change_in_steps_are_fitted_by_wider_differences(start):
+    """Both data are met from 20 to 24; a difference of 1 % sees no step of 4."""
+    cases = closed(lambda a: np.floor(a / 4.0) / 5.0 * np.array([1.0, 2.0]), a=(start, 4.0, 100.0))
+    found = cases.estimate()
+    assert found.computed == pytest.approx([1.0, 2.0]) and 20.0 <= found.x[0] < 24.0
+    assert 0.0 < found.std[0] < 8.0 and len(cases.answers) < 40
+
+
+def test_the_result_is_the_best_point_of_all_that_were_computed():
+    """A well within a widened step of the start lies beside a plateau."""
+    well = closed(lambda a: np.array([1.0, 2.0]) * (1.0 if 59.0 < a < 61.0 else 1.01), a=(50.0, 0.0, 100.0))
+    found = well.estimate()
+    assert 59.0 < found.x[0] < 61.0 and found.computed == pytest.approx([1.0, 2.0])
+
+
+def test_an_unknown_that_no_step_moves_has_neither_interval_nor_noise():
+    """Rounding errors of the values are no derivatives."""
+    cases = closed(lambda a: np.array([1.0, 2.0]) * (1.0 + 1e-13 * np.sin(1e6 * a)), a=(30.0, 10.0, 70.0))
+    found = cases.estimate()
+    assert found.std[0] == np.inf and {(24.0,), (36.0,)} <= cases.answers.keys()
+    line = (
+        "[unknown] a: steps of a tenth of its bounds change no computed value: with 6 teeth the curve is a staircase; "
+    )
+    faults = estimation.fit_document(cases.fit.unknowns, DATA, found, 6)["faults"]
+    assert faults == [f"{line}more teeth (softening_tolerance) make it smooth"]
+    assert estimation.fit_document(cases.fit.unknowns, DATA, found)["faults"] == [
+        "[unknown] a: no measured value depends on it"
+    ]

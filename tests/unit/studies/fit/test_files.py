@@ -39,7 +39,9 @@ def test_a_fit_that_its_bounds_keep_from_the_data_has_a_remark(computed, words):
     fit = parse(tomllib.loads(BASE + TEXT), Path())
     bounds, measured = (np.array([50.0]), np.array([500.0])), (np.array([150.0]), np.array([1.5]))
     found = summarize(bounds[1], np.array([computed]), measured, np.array([[1.0]]), bounds)
-    last = study_tables.fit_text(estimation.fit_document(fit.unknowns, fit.data, found)).splitlines()[-1]
+    content = estimation.fit_document(fit.unknowns, fit.data, found)
+    last = study_tables.fit_text(content).splitlines()[-1]
+    assert study_tables.fit_text(content, "C11 is ...").endswith("deviations off; C11 is ...") == bool(words)
     assert last.endswith(words) and ("material.fibre.young at its upper bound" in last) == bool(words)
 
 

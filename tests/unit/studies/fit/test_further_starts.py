@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.studies import fit_file
-from feti_homog.studies.fit import Answer, Evaluations
+from feti_homog.studies.fit import Evaluations
 
 STRAINS = np.linspace(0.001, 0.02, 15)
 TRUTH = (30.0, 0.2)  # strength, energy per volume
@@ -31,13 +31,11 @@ class OfBars(Evaluations):
     def fails(self, x: Any) -> bool:
         return False
 
-    def _run(self, name: str, places: Any) -> list[Answer]:
+    def _run(self, name: str, places: Any) -> list[Any]:
         self.count += len(places)
         if any(self.fails(x) for _, x in places):
             raise ConvergenceError("1 of 1 cases failed")
-        return [
-            Answer({"case": {"analysis": {"type": "path"}, "interface": []}, "path": [{}]}, bar(x)) for _, x in places
-        ]
+        return [({"case": {"analysis": {"type": "path"}, "interface": []}, "path": [{}]}, bar(x)) for _, x in places]
 
 
 def evaluations(folder: Path, monkeypatch: pytest.MonkeyPatch, start: tuple[float, float]) -> OfBars:
@@ -86,7 +84,7 @@ def test_cases_that_fail_are_no_starts(tmp_path, monkeypatch):
 def test_a_fault_without_any_sound_start_is_that_of_the_start(tmp_path, monkeypatch):
     bars = evaluations(tmp_path, monkeypatch, (140.0, 0.06))
 
-    def refuse(name: str, places: Any) -> list[Answer]:
+    def refuse(name: str, places: Any) -> list[Any]:
         raise CaseError(f"{name} is refused")
 
     bars._run = refuse  # type: ignore[method-assign]

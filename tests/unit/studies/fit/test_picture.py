@@ -20,7 +20,7 @@ def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_perce
         norm.ppf([0.025, 0.975]), abs=5e-3
     )
     words = [label.get_text() for label in axes.get_yticklabels()]
-    order = [part.strip() for part in axes.get_title().split("/")]
+    order = [part.strip() for part in axes.texts[0].get_text().split("/")]
     numbers = dict(zip(order, np.array([label.split()[1::2] for label in words], float).T, strict=True))
     assert [label.split()[0] for label in words] == [row["name"] for row in ROWS]
     assert numbers["measured"].tolist() == [4.0, 0.3, 8.0] and numbers["computed"].tolist() == [5.0, 0.2, 7.0]
@@ -29,6 +29,11 @@ def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_perce
     drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.lines[1:]}
     assert drawn == {"test 1": [[off[0], 0.0], [pytest.approx(off[1]), 1.0]], "test 2": [[off[2], 2.0]]}
     assert axes.yaxis_inverted() and axes.lines[0].get_xdata() == [0.0, 0.0]
+    heading, band = axes.texts
+    assert (heading.get_text(), band.get_text()) == ("measured / computed", "grey: 95 %")
+    figure = pictures.fit_figure({"name": "fit", "measured": ROWS, "unknowns": {"a": {"estimate": 2.0, "std": 0.25}}})
+    assert figure.get_suptitle() == "fit: computed and measured\na = 2 ± 0.25"
+    assert heading.get_window_extent().x1 < axes.get_window_extent().x0 < band.get_window_extent().x0
 
 
 def test_curves_have_points_with_deviations_and_lines_through_what_is_computed():

@@ -21,6 +21,10 @@ def test_statistics_are_scipys():
         assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
 
 
+def test_a_table_prints_as_a_line():
+    assert repr(samples(1.0)).startswith("SweepTable('") and len(repr(samples(1.0))) < 120
+
+
 def test_statistics_of_too_few_values_are_nan():
     found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
     assert found.count.tolist() == [1, 2, 0]
