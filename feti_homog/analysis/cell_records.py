@@ -123,9 +123,16 @@ class SolverInfo:
         "largest condition number of the projected, preconditioned dual operator, estimated by the iterations",
         default=None,
     )
+    options: Mapping[str, str] | None = described(
+        "options of PETSc in force, from [petsc], options file, PETSC_OPTIONS and command line; absent without any",
+        entries={"OPTION": "value of an option without dash, empty for none"},
+        default=None,
+    )
 
     @classmethod
-    def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
+    def of(
+        cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int], options: Mapping[str, str]
+    ) -> SolverInfo:
         """Return the record of the solvers in all problems.  Collective."""
         plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if plan.across else "bodies and pieces of bodies"
@@ -147,6 +154,7 @@ class SolverInfo:
             solves=sum(s.solves for s in solvers),
             iterations=tuple(iterations),
             converged_reason=tuple(reasons),
+            options=options or None,
         )
 
 

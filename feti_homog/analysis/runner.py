@@ -209,7 +209,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         "digest": mpi_errors.on_root(cell.comm, cell.case.digest),
         "cell": cell_info,
         "fibres": FibreInfo.all_of(cell),
-        "solver": SolverInfo.of(cell, checks.iterations, checks.reasons),
+        "solver": SolverInfo.of(cell, checks.iterations, checks.reasons, options_database.chosen_options()),
         "checks": checks.errors,
         "check_tolerance": checks.tolerance("jump"),
         "kkt_tolerance": CONTACT_TOLERANCE,

@@ -41,11 +41,26 @@ def read_document(path: str | Path) -> dict[str, Any]:
     except ValueError as error:  # also for a number with too many digits
         place = f"line {content.count(chr(10)) + 1}, the end"
         words = str(error).replace("newline or end of document after a statement", "one statement a line")
-        raise CaseError(f"{path}: not TOML: {words.replace('end of document', place)}") from None
+        words = f"{words.replace('end of document', place)}{_hint(str(error), content)}"
+        raise CaseError(f"{path}: not TOML: {words}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     # Without a UTF-8 locale, Python escapes the bytes of file names.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
+
+
+def _hint(fault: str, content: str) -> str:
+    """Quote the line at which tomllib stops, with a hint at the usual causes; "" without a line number."""
+    if (number := re.search(r"at line (\d+)", fault)) is None:
+        return ""
+    line = content.split("\n")[int(number[1]) - 1].strip()
+    key, _, value = map(str.strip, line.partition("="))
+    hint = f"; {key} is given twice" if fault.startswith("Cannot overwrite") else ""
+    if re.match(r"[-+]?\.?\d", value) and not hint:
+        hint = "; numbers have no unit, and a decimal point"
+    elif re.match(r"[^\W\d]", value) and not hint:
+        hint = "; text needs quotation marks"
+    return f": {wording.toml_value(line)}{hint}"
 
 
 def to_document(values: object) -> dict[str, Any]:

@@ -151,6 +151,8 @@ def distribute(
         cut = partition.decompose(torus, parts, pieces, n_ranks)
     table = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
     notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
+    nodes = _interface_nodes(torus, pairs, lattice)
+    of_case = cell_remarks.case_remarks(case, circles[is_fibre, 2], nodes)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -170,10 +172,10 @@ def distribute(
         origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        remarks=(*of_case, *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         shift=mesh.shift,
         across=across,
-        interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
+        interface_nodes=nodes if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_classes(torus))
     return [RankShare(summary, table, pairs, part) for part in shares]
@@ -209,7 +211,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
-            *cell_remarks.case_remarks(case),
+            *cell_remarks.case_remarks(case, radii[is_fibre]),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
         shift=np.array([regions.width, regions.height]),

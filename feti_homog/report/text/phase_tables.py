@@ -25,11 +25,13 @@ def phase_tables(document: Document) -> list[Table]:
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
         for name, (phase, k) in zip(names, pairs, strict=True)
     ]
-    loads = ", under unit loads" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
+    loads = ", under one unit strain, all others 0" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
     tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
     is_mixed = bool(load.get("temperature")) and len([value for value in load.values() if value]) > 1
     has_factors = "path" not in document and not is_mixed  # stresses in proportion to the load
+    acting = [name for name, value in load.items() if value]
+    stress = acting[0] if has_factors and len(acting) == 1 and acting[0].startswith("S") else None
     used = list[list[Any]]()
     for name, (phase, k) in zip(names, pairs, strict=True):
         if "criterion" in phase:
@@ -37,9 +39,12 @@ def phase_tables(document: Document) -> list[Table]:
             used.append([name, phase["criterion"], value, place])
             used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
             used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
+            used[-1] += [load[stress] / value if value else UNKNOWN] if stress else []
     heads = [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)]
     heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
-    notes = ["  load factor: at this multiple of the load the utilisation is 1"] * has_factors
+    heads += [Column(f"at {stress}")] if stress else []
+    at = f", and at this {stress}" if stress else ""
+    notes = [f"  load factor: at this multiple of the load{at} the utilisation is 1"] * has_factors
     return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
 
 
