@@ -124,15 +124,11 @@ class SolverInfo:
         default=None,
     )
     options: Mapping[str, str] | None = described(
-        "options of PETSc in force, from [petsc], options file, PETSC_OPTIONS and command line; absent without any",
-        entries={"OPTION": "value of an option without dash, empty for none"},
-        default=None,
+        "solver options that change more than the output", entries={"OPTION": "its value, or empty"}, default=None
     )
 
     @classmethod
-    def of(
-        cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int], options: Mapping[str, str]
-    ) -> SolverInfo:
+    def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
         """Return the record of the solvers in all problems.  Collective."""
         plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if plan.across else "bodies and pieces of bodies"
@@ -154,7 +150,6 @@ class SolverInfo:
             solves=sum(s.solves for s in solvers),
             iterations=tuple(iterations),
             converged_reason=tuple(reasons),
-            options=options or None,
         )
 
 

@@ -68,9 +68,8 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                     context.progress.say(line)
             points = f"{len(entries)} {path.method.removesuffix('s' * (len(entries) == 1))}"
             counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
-            if (damage := law.damage(point.state.bonds)) is not None:
-                damaged = (damage > 0.0) & (damage < 1.0)
-                counts += f", {context.cell.sum_over_ranks(int(damaged.sum()))} damaged"
+            if (d := law.damage(point.state.bonds)) is not None:
+                counts += f", {context.cell.sum_over_ranks(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
             known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), counts, known)
             bonds.append(bond)

@@ -187,15 +187,13 @@ def resumable(context: AnalysisContext) -> int:
     say = context.progress.say
     if not context.resume:
         if dropped := context.checkpoint.clear():
-            events = "events of an earlier run are" if dropped > 1 else "event of an earlier run is"
-            say(f"  {dropped} {events} dropped; --resume would have gone on")
+            say(f"  dropped events of an earlier run: {dropped}; --resume would have gone on from them")
         return 0
     stored_events = context.checkpoint.count()
     if (count := holding(context, consistent(context, stored_events))) < stored_events:
         say(f"  event {count} of the checkpoint is invalid: the run computes it and all later events again")
     begin = "there is no checkpoint: the path starts from the beginning"
-    events = "event is" if count == 1 else "events are"
-    say(f"  {f'{count} {events} taken from the checkpoint' if stored_events else begin}")
+    say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
     return count
 
 

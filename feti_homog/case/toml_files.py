@@ -41,26 +41,16 @@ def read_document(path: str | Path) -> dict[str, Any]:
     except ValueError as error:  # also for a number with too many digits
         place = f"line {content.count(chr(10)) + 1}, the end"
         words = str(error).replace("newline or end of document after a statement", "one statement a line")
-        words = f"{words.replace('end of document', place)}{_hint(str(error), content)}"
-        raise CaseError(f"{path}: not TOML: {words}") from None
+        words, number = words.replace("end of document", place), re.search(r"at line (\d+), col", str(error))
+        text = content.split("\n")[int(number[1]) - 1].strip() if number else ""
+        hint = "; numbers have no unit, and a decimal point" if re.search(r"=\s*[-+.]*\d", text) else ""
+        hint = "; text needs quotation marks" if re.search(r"=\s*[^\W\d]", text) else hint
+        hint = f"; {text.partition('=')[0].strip()} is given twice" if "overwrite" in words else hint
+        raise CaseError(f"{path}: not TOML: {words}{f': {wording.toml_value(text)}{hint}' if text else ''}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     # Without a UTF-8 locale, Python escapes the bytes of file names.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
-
-
-def _hint(fault: str, content: str) -> str:
-    """Quote the line at which tomllib stops, with a hint at the usual causes; "" without a line number."""
-    if (number := re.search(r"at line (\d+)", fault)) is None:
-        return ""
-    line = content.split("\n")[int(number[1]) - 1].strip()
-    key, _, value = map(str.strip, line.partition("="))
-    hint = f"; {key} is given twice" if fault.startswith("Cannot overwrite") else ""
-    if re.match(r"[-+]?\.?\d", value) and not hint:
-        hint = "; numbers have no unit, and a decimal point"
-    elif re.match(r"[^\W\d]", value) and not hint:
-        hint = "; text needs quotation marks"
-    return f": {wording.toml_value(line)}{hint}"
 
 
 def to_document(values: object) -> dict[str, Any]:

@@ -35,9 +35,8 @@ def criterion(strength: PhaseStrength) -> str:
         if names_given == list(names):
             return title
     groups = "; ".join(f"{', '.join(names)} ({title})" for title, names in CRITERIA.items())
-    hint = ". With tension alone write principal, or add compression" if names_given == ["tension"] else ""
-    given = ", ".join(names_given) or "empty"
-    raise ValueError(f"strength: {given}: expected the keys of one criterion: {groups}{hint}")
+    groups += ". With tension alone write principal, or add compression" if names_given == ["tension"] else ""
+    raise ValueError(f"strength: {', '.join(names_given) or 'empty'}: expected the keys of one criterion: {groups}")
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:

@@ -60,14 +60,9 @@ def given_options() -> dict[str, str]:
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
-def chosen_options() -> dict[str, str]:
-    """Return the options that a user gave, without the options that the program sets itself."""
-    return {name: value for name, value in given_options().items() if name not in ("skip_petscrc", "options_left")}
-
-
-def choices(prefix: str) -> list[str]:
+def choices(prefix: str) -> dict[str, str]:
     """Return the options with a prefix, except options that only print."""
-    return [name for name in given_options() if name.startswith(prefix) and not table.only_prints(name)]
+    return {k: value for k, value in given_options().items() if k.startswith(prefix) and not table.only_prints(k)}
 
 
 def without_iterations() -> str:
