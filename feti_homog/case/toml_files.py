@@ -43,8 +43,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         words = str(error).replace("newline or end of document after a statement", "one statement a line")
         words, number = words.replace("end of document", place), re.search(r"at line (\d+), col", str(error))
         text = content.split("\n")[int(number[1]) - 1].strip() if number else ""
-        hint = "; numbers have no unit, and a decimal point" if re.search(r"=\s*[-+.]*\d", text) else ""
-        hint = "; text needs quotation marks" if re.search(r"=\s*[^\W\d]", text) else hint
+        hint = "; numbers have no unit, and a decimal point" if re.match(r"[^=]*=\s*[-+.]*\d[^=]*$", text) else ""
+        hint = "; text needs quotation marks, true and false do not" if re.match(r"[^=]*=\s*[A-Za-z]", text) else hint
         hint = f"; {text.partition('=')[0].strip()} is given twice" if "overwrite" in words else hint
         raise CaseError(f"{path}: not TOML: {words}{f': {wording.toml_value(text)}{hint}' if text else ''}") from None
     except OSError as error:
