@@ -110,15 +110,13 @@ def checked(
     no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.
     """
     lines, moved = list(faults), nodes.moved_tips(case, len(centres))
-    for pair, interface in enumerate(case.interfaces):
-        label = interface_section.interface_label(pair, len(case.interfaces))
+    for label, interface in interface_section.labelled(case.interfaces):
         lines += debonded_arcs.faults(interface.debonded, centres, label)
     if lines:
         return moved, lines
     openings: Sequence[float | None] = case.section.openings or [None]
-    for pair, interface in enumerate(case.interfaces):
+    for pair, (label, interface) in enumerate(interface_section.labelled(case.interfaces)):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
-        label = interface_section.interface_label(pair, len(case.interfaces))
         for (number, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{number}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])

@@ -150,6 +150,7 @@ def distribute(
         cut = partition.decompose(torus, parts, pieces, n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
     notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
+    bonds = _interface_nodes(torus, pairs, lattice, pinned) if across or len(case.interfaces) else 0
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -169,10 +170,10 @@ def distribute(
         origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         shift=mesh.shift,
         across=across,
-        interface_nodes=_interface_nodes(torus, pairs, lattice, pinned) if across else None,
+        interface_nodes=bonds if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned)
     return [RankShare(summary, table, pairs, part) for part in shares]
@@ -208,6 +209,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
+            *cell_remarks.soft_springs(case, radii[is_fibre]),
             *cell_remarks.case_remarks(case),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
@@ -239,8 +241,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
     `centres` are (n, 2), and `radii` are (n,).
     """
-    window = case.cell.matched
-    if window is None:
+    if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours
 

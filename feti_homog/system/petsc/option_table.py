@@ -46,7 +46,7 @@ OPTIONS = (
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
     Option("feti_pc_type", PC_TYPES, "auto", "dual preconditioner; influence: exact; adaptive space: dirichlet alone"),
-    Option("feti_dual_operator", "auto|implicit|explicit", "auto", "subdomains by triangular solves or dense matrices"),
+    Option("feti_dual_operator", "auto|implicit|explicit", "auto", "triangular solves (natural coarse space) or dense"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
     Option(
@@ -95,8 +95,8 @@ PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewe
 SHOWING = re.compile(r"(^|_)(view|monitor|converged_reason|converged_rate)(_|$)|_(compute|plot)_(singular|eigen)values")
 LEVEL = re.compile(r"_(print|printstat|statprint)$|_mumps_icntl_[1-4]$")
 
-CLOSE = 0.9
-"""Least similarity (by difflib; 1 for equal names) of a misspelt name: one or two letters differ."""
+CLOSE = 0.87
+"""Least similarity (by difflib; 1 for equal names) of a misspelt name: of eight letters, one differs."""
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
