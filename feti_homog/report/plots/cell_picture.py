@@ -92,7 +92,8 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
         room = outline.query(middles[triangles])[0]
         inner, size = triangles[room.argmax()], min(room.max() * scale, 11.0)
         if size >= LEAST_SIZE:
-            axes.text(*middles[inner], str(coloured[inner]), fontsize=size, ha="center", va="center", clip_on=True)
+            x, y = middles[inner]
+            axes.text(x, y, str(coloured[inner]), fontsize=size, ha="center", va="center", clip_on=True)
     return picture
 
 
