@@ -84,13 +84,12 @@ def _result_folder(arguments: argparse.Namespace) -> Path:
     if not os.path.isdir(directory):
         fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"
         raise CaseError(f"{directory}: {fault}")
-    is_result = os.path.exists(directory / result_json.NAME)
-    names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name) and not is_result]
+    names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name)]
+    if os.path.exists(directory / result_json.NAME) or not names:
+        return directory
     if names == [case_folders.INDEX_FILE]:
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` draws a sweep"
         )
-    if names:
-        raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")
-    return directory
+    raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")

@@ -21,7 +21,6 @@ CONFIDENCE = 0.95
 LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
 # The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
-WIDEST = 0.1  # longest step of differences without effect, relative to the width of the bounds
 STEP, MOST_EVALUATIONS = 1e-5, 60  # of the unknowns, far below 1 % differences and std
 Model = Callable[[Float], Float]
 

@@ -30,7 +30,6 @@ from feti_homog.typing import Float
 
 STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
 DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
-SAME_VALUE = 1e-9  # relative difference of computed values by rounding, and by the tolerance of the solver
 Point = tuple[float, ...]
 
 
@@ -216,7 +215,7 @@ class Evaluations:
         """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
 
         A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
-        twice the step, up to `estimation.WIDEST`.
+        twice the step, up to a tenth of the width of its bounds.
         """
         key, centre = _rounded(x), self.values(x)
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
@@ -224,7 +223,8 @@ class Evaluations:
             column = exact_derivatives(self.answers[key][test], self.fit.data_of(test), name)
             J[self.fit.rows_of(test), k] = np.nan if column is None else column
         bounds = [(unknown.lower, unknown.upper) for unknown in unknowns.values()]
-        widths, noise = np.ptp(bounds, axis=1), SAME_VALUE * (np.abs(centre) + [datum.std for datum in self.fit.data])
+        widths = np.ptp(bounds, axis=1)
+        noise = 1e-9 * (np.abs(centre) + [datum.std for datum in self.fit.data])  # rounding, and tolerance of solvers
         inexact = np.flatnonzero(np.isnan(J).any(axis=0)).tolist()
         steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
 
@@ -236,7 +236,7 @@ class Evaluations:
         name = self.folders[key].replace("evaluation", "differences")
         answers = iter(self._ask(name, [(test, point) for point in ends for test in tests]) if ends else ())
         self.computed |= {point: np.concatenate([next(answers)[1] for _ in tests]) for point in ends}
-        for (k, side), widest in ((pair, estimation.WIDEST * widths[pair[0]]) for pair in steps):
+        for (k, side), widest in ((pair, 0.1 * widths[pair[0]]) for pair in steps):
             with suppress(CaseError, ConvergenceError):
                 while abs(step := steps[k, side]) < widest and np.all(
                     abs(self.computed[end(k, step)] - centre) <= noise
@@ -250,11 +250,11 @@ class Evaluations:
             J[:, k] = np.where(np.isnan(J[:, k]), slope, J[:, k])
         return J
 
-    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
+    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
         self.evaluator.comm.bcast((name, places))
         return self._run(name, places)
 
-    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[Mapping[str, Any], Float]]:
+    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
         """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))

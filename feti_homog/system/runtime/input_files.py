@@ -57,9 +57,8 @@ def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
 def unreadable(path: Path, error: OSError) -> FetiHomogError:
     """Return the exception for an unreadable file: CaseError, or FetiHomogError without permission."""
     kind = FetiHomogError if isinstance(error, PermissionError) else CaseError
-    is_open = "file locking flag" in str(error)  # by HDF5
-    reason = "it is open in this program: close it, or open it with h5py.File(path, locking=False)" if is_open else ""
-    return kind(f"cannot read {path}: {reason or error.strerror or error}")
+    is_open = "it is open in this program: close it, or open it with h5py.File(path, locking=False)"
+    return kind(f"cannot read {path}: {is_open if 'file locking flag' in str(error) else error.strerror or error}")
 
 
 def in_own_process(
