@@ -69,7 +69,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             points = f"{len(entries)} {path.method.removesuffix('s' * (len(entries) == 1))}"
             counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
             if (d := law.damage(point.state.bonds)) is not None:
-                counts += f", {context.comm.allreduce(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
+                counts += f", {context.cell.comm.allreduce(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
             known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), counts, known)
             bonds.append(bond)
