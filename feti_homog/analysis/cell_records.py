@@ -123,6 +123,9 @@ class SolverInfo:
         "largest condition number of the projected, preconditioned dual operator, estimated by the iterations",
         default=None,
     )
+    options: Mapping[str, str] | None = described(
+        "solver options that change more than the output", entries={"OPTION": "its value, or empty"}, default=None
+    )
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:

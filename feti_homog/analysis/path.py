@@ -66,9 +66,12 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 context.log(line)
                 if number == 0 or len(context.checks.faults) > faults:
                     context.progress.say(line)
-            counts = f"{entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
+            points = f"{len(entries)} {path.method.removesuffix('s' * (len(entries) == 1))}"
+            counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
+            if (d := law.damage(point.state.bonds)) is not None:
+                counts += f", {context.cell.sum_over_ranks(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
             known = number == 0 or before is not None  # the first break takes much of the load, and no time
-            advance(point.load_factor, len(entries), f"{len(entries)} {path.method}, {counts}", known)
+            advance(point.load_factor, len(entries), counts, known)
             bonds.append(bond)
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state
@@ -81,7 +84,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 break
     if last is None:
         return {"resumed": count, "path": ()}
-    context.progress.say(f"  all {len(entries)} {path.method} are in {context.events}")
+    context.progress.say(f"  {points} in {context.events}")
     return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
 
 

@@ -187,7 +187,7 @@ def resumable(context: AnalysisContext) -> int:
     say = context.progress.say
     if not context.resume:
         if dropped := context.checkpoint.clear():
-            say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
+            say(f"  dropped events of an earlier run: {dropped}; --resume would have gone on from them")
         return 0
     stored_events = context.checkpoint.count()
     if (count := holding(context, consistent(context, stored_events))) < stored_events:

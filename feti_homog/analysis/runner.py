@@ -181,7 +181,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 def _opening(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries known before the analysis, with errors and times so far.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
-    fractions = cell.fractions()
+    fractions, options = cell.fractions(), options_database.choices("feti_")
     # Straight edges cut off a part of the fibres.
     area = sum(cell.case.cell.fractions.values())
     meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
@@ -209,7 +209,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         "digest": mpi_errors.on_root(cell.comm, cell.case.digest),
         "cell": cell_info,
         "fibres": FibreInfo.all_of(cell),
-        "solver": SolverInfo.of(cell, checks.iterations, checks.reasons),
+        "solver": replace(SolverInfo.of(cell, checks.iterations, checks.reasons), options=options or None),
         "checks": checks.errors,
         "check_tolerance": checks.tolerance("jump"),
         "kkt_tolerance": CONTACT_TOLERANCE,

@@ -287,6 +287,8 @@ def check_phases(case: Case, phases: Iterable[str]) -> None:
     faults = [f"[material.{wording.toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]
     unused = [phase for phase in case.materials if phase not in sources.values()]
     has = ", ".join(map(wording.toml_key, sources))
+    if len(unused) == len(without) == 1 and not case.cell.phases:
+        has += f". If they are the same, add to [cell]: phases = {{{unused[0]} = {wording.toml_value(without[0])}}}"
     faults += [f"[material.{wording.toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused]
     if faults:
         raise CaseError(*faults)

@@ -1,14 +1,15 @@
 """Define the section [interface]: initially debonded arcs, and bonds that hold or break."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from feti_homog.case import section_values as kinds
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
 from feti_homog.schema import key, limits, types
 
+T = TypeVar("T")
 pair_key = partial(key, by_pair=True)
 """Return a key in which several [[interface]] sections may differ; they agree in all other keys."""
 
@@ -259,6 +260,6 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
     return given if isinstance(given, list) else [given]
 
 
-def interface_label(number: int, count: int) -> str:
-    """Return the label of an interface in messages; numbers begin at 0, labels at 1."""
-    return "interface" if count == 1 else f"interface {number + 1}"
+def labelled(sections: Sequence[T]) -> list[tuple[str, T]]:
+    """Return the interface sections with their labels in messages, which begin at 1."""
+    return [(f"interface {number}" if len(sections) > 1 else "interface", s) for number, s in enumerate(sections, 1)]

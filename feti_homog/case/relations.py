@@ -8,7 +8,7 @@ from typing import Any
 
 from feti_homog.case import load_sections
 from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
-from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
+from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_tables, labelled
 from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
 from feti_homog.materials import material_forms, voigt
@@ -95,16 +95,15 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
     elif len(tables) > limits.SECTIONS:
         reader.faults.append(f"[[interface]]: {len(tables)} sections; expected at most {limits.SECTIONS}")
         return None
-    labels = [interface_label(n, len(tables)) for n in range(len(tables))]
     interfaces: list[InterfaceSection] = []
-    for label, table in zip(labels, tables, strict=True):
+    for label, table in labelled(tables):
         if interface := reader.read(InterfaceSection, table, label):
             named = replace(interface, criterion=interface.law or interface.criterion, law=None)
             interfaces.append(replace(named, **_of_branch(named)))
     if len(interfaces) < len(tables):
         return None
     first: dict[frozenset[str], int] = {}
-    for number, (label, interface) in enumerate(zip(labels, interfaces, strict=True) if len(tables) > 1 else ()):
+    for number, (label, interface) in enumerate(labelled(interfaces) if len(tables) > 1 else ()):
         if interface.between is None:
             reader.faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
             continue
@@ -118,7 +117,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
                 expected = f"expected {_written(common)}, as of [interface 1]"
                 word = "law" if name == "criterion" and name not in tables[number] else name
                 reader.faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
-    for label, interface, table in zip(labels, interfaces, tables, strict=True):
+    for (label, interface), table in zip(labelled(interfaces), tables, strict=True):
         reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
     return tuple(interfaces)
 
@@ -182,12 +181,8 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
     """List the friction keys without effect at zero friction, in one line each."""
-    lines = []
-    for number, each in enumerate(interfaces):
-        if each.friction_on_damage and each.friction == 0.0:
-            label = interface_label(number, len(interfaces))
-            lines.append(f"[{label}] friction_on_damage = true: without effect, for friction = 0")
-    return lines
+    idle = [label for label, each in labelled(interfaces) if each.friction_on_damage and each.friction == 0.0]
+    return [f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle]
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:

@@ -115,7 +115,7 @@ class Decomposition:
     cut: str = key(
         types.choice("auto", "bodies"),
         '"bodies": each body is cut by itself. "auto": the faster way, which is to cut the whole cell across its '
-        "materials if nothing can part, unknowns are at most 400 000, stiffnesses differ by at most 1e4, and neither "
+        "materials if nothing can part, unknowns are at most 400 000, stiffnesses differ by at most 1e3, and neither "
         "another key nor a solver option is given, except tolerances and options that only print.",
         default="auto",
     )

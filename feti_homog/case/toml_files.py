@@ -41,7 +41,12 @@ def read_document(path: str | Path) -> dict[str, Any]:
     except ValueError as error:  # also for a number with too many digits
         place = f"line {content.count(chr(10)) + 1}, the end"
         words = str(error).replace("newline or end of document after a statement", "one statement a line")
-        raise CaseError(f"{path}: not TOML: {words.replace('end of document', place)}") from None
+        words, number = words.replace("end of document", place), re.search(r"at line (\d+), col", str(error))
+        text = content.split("\n")[int(number[1]) - 1].strip() if number else ""
+        hint = "; numbers have no unit, and a decimal point" if re.match(r"[^=]*=\s*[-+.]*\d[^=]*$", text) else ""
+        hint = "; text needs quotation marks, true and false do not" if re.match(r"[^=]*=\s*[A-Za-z]", text) else hint
+        hint = f"; {text.partition('=')[0].strip()} is given twice" if "overwrite" in words else hint
+        raise CaseError(f"{path}: not TOML: {words}{f': {wording.toml_value(text)}{hint}' if text else ''}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     # Without a UTF-8 locale, Python escapes the bytes of file names.

@@ -105,9 +105,8 @@ def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[debonded_arcs.Move
     """List the arcs, and the nonzero [angle] openings, that select no node."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
-    for pair, interface in enumerate(case.interfaces):
+    for pair, (label, interface) in enumerate(interface_section.labelled(case.interfaces)):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
-        label = interface_section.interface_label(pair, len(case.interfaces))
         for (number, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{number}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])

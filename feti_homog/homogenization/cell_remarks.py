@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from feti_homog.case import Case, cell_sizes, interface_section
+from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.arc_selection import LEAST_SIZE
 from feti_homog.materials import engineering_constants, laws
-from feti_homog.mesh import Torus, submeshes
+from feti_homog.mesh import Torus, mesh_fibres, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
@@ -42,13 +42,11 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
-    for number, interface in enumerate(case.interfaces):
+    for section, interface in interface_section.labelled(case.interfaces):
         if interface.between is None:
             continue
-        section = interface_section.interface_label(number, len(case.interfaces))
         line = f"[{section}] between = {wording.toml_value(list(interface.between))}: "
-        unknown = [name for name in interface.between if name not in phases]
-        if unknown:
+        if unknown := [name for name in interface.between if name not in phases]:
             lines.append(f"{line}the cell has no phase {wording.toml_value(unknown[0])}; it has {', '.join(phases)}")
         elif not touching[tuple(map(phases.index, interface.between))]:
             lines.append(f"{line}expected phases that touch; in this cell they do nowhere")
@@ -58,11 +56,12 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     """List the remarks on a mesh and its interfaces.
 
-    They concern the mesh, an [interface] without effect, and nodes that never part; for `pairs` see `share_entities`.
+    They concern the mesh, interfaces without effect or too soft, and nodes that never part; `pairs` as in `pairs_of`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
+    lines += soft_springs(case, mesh_fibres.fibre_circles(torus)[mesh_fibres.fibre_numbers(torus)[1], 2])
     can_open = any((case.arcs, has_curve, phase_laws.has_springs(case), case.section.breaks))
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
@@ -96,8 +95,8 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
     return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
 
 
-def case_remarks(case: Case) -> tuple[str, ...]:
-    """Note the conditions on sides, the teeth that a tolerance gives, and a fraction unlike the matched table's."""
+def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
+    """Note conditions on sides, teeth of `bonds` bonds (0: unknown), and a fraction unlike the matched table's."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -105,7 +104,8 @@ def case_remarks(case: Case) -> tuple[str, ...]:
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         levels = getattr(phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64)), "levels", ())
         remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "
-        lines = (f"{remark}{len(levels) - 1} teeth a bond",) if len(levels) else ()
+        events = f", up to {(len(levels) - 1) * bonds} events" if bonds else ""
+        lines = (f"{remark}{len(levels) - 1} teeth a bond{events}",) if len(levels) else ()
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
     fraction = cell.matched.fibre_fraction
@@ -114,6 +114,23 @@ def case_remarks(case: Case) -> tuple[str, ...]:
         "away as there, in diameters"
     )
     return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
+
+
+def soft_springs(case: Case, radii: Float) -> list[str]:
+    """Note springs with a strength that are too soft to stand for bonds.
+
+    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness falls as E' / (k r).  At 1 / 50, the limit of
+    Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), 30 to 60 % of fibres in epoxy lose 2.5 to 10 % of C11.
+    """
+    lines, radii = list[str](), radii[np.isfinite(radii)]
+    for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):
+        k, name = min((getattr(bond, name) or math.inf, name) for name in bond_laws.STIFFNESSES)
+        ratio = k * radii.mean() / _modulus(case, "matrix")
+        if ratio < 50.0 and any(getattr(bond, name) for name in bond_laws.STRENGTHS):
+            line = f"[{section}] {name} = {k:g}: k r / E' = {ratio:.2g}, so the springs take part of the deformation; "
+            unit = "; check the unit of length" if ratio < 0.1 else ""
+            lines.append(f"{line}from {50.0 * k / ratio:.2g} on less than 10 %{unit}")
+    return lines
 
 
 def longest(ends: Float) -> float:
@@ -134,11 +151,13 @@ def process_zone(case: Case) -> float | None:
         lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
     if not phase_laws.has_process_zone(case) or not lengths:
         return None
-    moduli = [
-        engineering_constants.engineering_moduli(laws.plane_stiffness(m, case.analysis.plane))
-        for m in case.materials.values()
-    ]
-    return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
+    return min(_modulus(case, phase) for phase in case.materials) * min(lengths)
+
+
+def _modulus(case: Case, phase: str) -> float:
+    """Return Young's modulus of a phase in the plane state, along the most compliant axis."""
+    moduli = engineering_constants.engineering_moduli(laws.plane_stiffness(case.materials[phase], case.analysis.plane))
+    return min(moduli.E1, moduli.E2)
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
@@ -184,14 +203,13 @@ def _law_warnings(case: Case) -> list[str]:
     if not phase_laws.has_softening(case):
         return []
     lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
-    for number, bond in enumerate(case.interfaces):
+    for section, bond in interface_section.labelled(case.interfaces):
         stiffness, strength, toughness = (
             getattr(bond, f"tangential_{kind}") / getattr(bond, f"normal_{kind}")
             for kind in ("stiffness", "strength", "toughness")
         )
         similar = strength**2 / toughness
         if abs(stiffness / similar - 1.0) > SAME_RATIO:
-            section = interface_section.interface_label(number, len(case.interfaces))
             lines.append(
                 f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
                 f"changes depends on the path; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "

@@ -133,9 +133,9 @@ def distribute(
     circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
     centres = in_cell(circles[:, :2], mesh.period) if mesh.boundary == "periodic" else circles[:, :2]
     faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
-    moved = (debonded_arcs.NOT_MOVED,) * (count := len(case.interfaces))
-    for pair, bond in enumerate(case.interfaces):
-        faults += debonded_arcs.faults(bond.debonded, centres[is_fibre], interface_section.interface_label(pair, count))
+    moved, bonds = (debonded_arcs.NOT_MOVED,) * len(case.interfaces), _interface_nodes(torus, pairs, lattice)
+    for label, bond in interface_section.labelled(case.interfaces):
+        faults += debonded_arcs.faults(bond.debonded, centres[is_fibre], label)
     if case.arcs and not faults:
         nodes = arc_selection.EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case, int(is_fibre.sum()))
@@ -170,10 +170,10 @@ def distribute(
         origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*cell_remarks.case_remarks(case), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
         shift=mesh.shift,
         across=across,
-        interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
+        interface_nodes=bonds if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, submeshes.pinned_classes(torus))
     return [RankShare(summary, table, pairs, part) for part in shares]
@@ -209,6 +209,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
+            *cell_remarks.soft_springs(case, radii[is_fibre]),
             *cell_remarks.case_remarks(case),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),
         ),
@@ -236,8 +237,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
     `centres` are (n, 2), and `radii` are (n,).
     """
-    window = case.cell.matched
-    if window is None:
+    if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours
 

@@ -35,6 +35,7 @@ def criterion(strength: PhaseStrength) -> str:
         if names_given == list(names):
             return title
     groups = "; ".join(f"{', '.join(names)} ({title})" for title, names in CRITERIA.items())
+    groups += ". With tension alone write principal, or add compression" if names_given == ["tension"] else ""
     raise ValueError(f"strength: {', '.join(names_given) or 'empty'}: expected the keys of one criterion: {groups}")
 
 

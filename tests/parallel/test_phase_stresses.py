@@ -42,7 +42,19 @@ def phases_of(*of_run, **more):
 def factors(result):
     """Return the printed load factor of each phase."""
     *_, table = phase_tables.phase_tables(result.document)
-    return {row[0]: row[-1] for row in table.rows if table.columns[-1].name == "load factor"}
+    names = [column.name for column in table.columns]
+    return {row[0]: row[names.index("load factor")] for row in table.rows if "load factor" in names}
+
+
+@pytest.mark.one_rank
+@pytest.mark.parametrize(("load", "heads"), [({"S11": 30.0}, ["at S11"]), ({"S11": 30.0, "S12": 1.0}, [])], ids=str)
+def test_the_stress_at_which_a_phase_fails_stands_beside_the_factor(comm, load, heads):
+    """A uniform cell under S11 alone reaches its strength at S11 = 100; "von Mises" of a cell in plane stress."""
+    result = result_of(comm, load, plane="stress", fibre=MATRIX, strengths=({"von_mises": 100.0}, None))
+    *_, used = phase_tables.phase_tables(result.document)
+    assert [column.name for column in used.columns if column.name.startswith("at ")] == heads
+    expected = [100.0] if heads else [*factors(result).values()]
+    assert [row[-1] for row in used.rows] == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("order", [1, 2])

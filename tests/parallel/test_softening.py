@@ -1,5 +1,7 @@
 """Interfaces that soften: paths against brute force, a laminate in closed form, limits of the law."""
 
+import re
+from contextlib import contextmanager
 from itertools import pairwise
 from unittest import mock
 
@@ -12,6 +14,7 @@ from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
+from feti_homog.analysis import stepped_progress
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.results import checkpoints
@@ -56,6 +59,26 @@ def law_of(interface):
 
 
 KINDS = ("stiffness", "strength", "toughness")
+
+
+def test_a_running_path_shows_how_many_bonds_are_damaged(comm, monkeypatch):
+    """Each event breaks the next tooth of a bond: the number is at most that of teeth, and never 0 after the first."""
+    calls = list[tuple[str, float]]()
+
+    @contextmanager
+    def shown(progress, label):
+        yield lambda share, count, text, known: calls.append(text)
+
+    monkeypatch.setattr(stepped_progress, "shown", shown)
+    more = {"petsc": INFLUENCE, "path": {"waypoints": [{"E11": 0.01}]}}
+    path = solved(comm, cell={}, phases=EPOXY_GLASS, plane="strain", interface=BILINEAR, **more).path
+    begin = re.compile(r"(1 event|\d+ events), (\d+) bonded, (\d+) broken, (\d+) damaged$")
+    matches = [begin.match(text) for text in calls]
+    assert len(matches) == len(path) and matches[0][1] == "1 event" and int(matches[0][4]) == 0
+    softened = np.cumsum([point.softened for point in path])
+    for match, before, point in zip(matches[1:], softened[:-1], path[1:], strict=True):
+        assert 0 < int(match[4]) + int(match[3]) <= before and int(match[2]) == point.bonded
+    assert int(matches[1][4]) == path[0].softened
 
 
 @pytest.mark.one_rank

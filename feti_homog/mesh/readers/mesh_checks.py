@@ -242,7 +242,8 @@ def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
         return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []
     if empty > ROUNDING and not has_voids:
         where = f"holes, {100 * empty:.3g} % of the cell, the first beside {raw.edge(pairs[0])}"
-        return [f"{where}: expected elements there, or voids = true in [cell] if holes are voids"]
+        unsaved = " (gmsh saves no surface outside physical groups)" if raw.container == "physical surface" else ""
+        return [f"{where}: expected elements there{unsaved}, or voids = true in [cell] if holes are voids"]
     ends = mesh.representative[pairs]
     crowded = pairs[(np.bincount(ends.ravel(), minlength=len(mesh.points))[ends] > 2).any(axis=1)]
     faults = _listed("voids that touch in a node, as at ", crowded, raw.edge)

@@ -25,11 +25,14 @@ def phase_tables(document: Document) -> list[Table]:
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
         for name, (phase, k) in zip(names, pairs, strict=True)
     ]
-    loads = ", under unit loads" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
+    loads = " or temperature, all others 0" if "temperature" in labels else ", all others 0"
+    loads = f", under one unit strain{loads}" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
     tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
-    is_mixed = bool(load.get("temperature")) and len([value for value in load.values() if value]) > 1
-    has_factors = "path" not in document and not is_mixed  # stresses in proportion to the load
+    acting = [name for name, value in load.items() if value]
+    # stresses in proportion to the load
+    has_factors = "path" not in document and not ("temperature" in acting and len(acting) > 1)
+    stresses = [name for name in acting if has_factors and acting == [name] and name.startswith("S")]
     used = list[list[Any]]()
     for name, (phase, k) in zip(names, pairs, strict=True):
         if "criterion" in phase:
@@ -37,9 +40,12 @@ def phase_tables(document: Document) -> list[Table]:
             used.append([name, phase["criterion"], value, place])
             used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
             used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
+            used[-1] += [load[name] / value if value else UNKNOWN for name in stresses]
     heads = [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)]
     heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
-    notes = ["  load factor: at this multiple of the load the utilisation is 1"] * has_factors
+    heads += [Column(f"at {name}") for name in stresses]
+    alone = "".join(f", at this {name}," for name in stresses)
+    notes = [f"  load factor: at this multiple of the load{alone} the utilisation is 1"] * has_factors
     return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
 
 

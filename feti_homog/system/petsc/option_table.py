@@ -46,7 +46,7 @@ OPTIONS = (
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
     Option("feti_pc_type", PC_TYPES, "auto", "dual preconditioner; influence: exact; adaptive space: dirichlet alone"),
-    Option("feti_dual_operator", "auto|implicit|explicit", "auto", "subdomains by triangular solves or dense matrices"),
+    Option("feti_dual_operator", "auto|implicit|explicit", "auto", "triangular solves (natural coarse space) or dense"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
     Option(
@@ -110,7 +110,7 @@ def unknown_options(names: Iterable[str]) -> list[str]:
             hint = f"not an option of this program; did you mean -feti_{name}?"
         elif NOT_IN_BATCH.match(name):
             hint = "no option of a program that runs in batch"
-        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)):
+        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, 7 / 8)):
             hint = f"unknown option; did you mean -{nearest[0]}?"
         elif name not in PETSC_NAMES and not name.startswith(PETSC_BEGINNINGS):
             hint = "unknown option; solvers of this program have options that begin with -feti_"

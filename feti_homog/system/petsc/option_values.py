@@ -49,6 +49,7 @@ def faulty_values(options: Mapping[str, Value]) -> list[str]:
     texts = {name: _text(value) for name, value in options.items()}
     return sorted(
         f"{in_words(name, text)}: expected {rule[0]}"
+        + "; there is no such file" * (name == "options_file" and not os.path.exists(text))
         for name, text in texts.items()
         if (rule := PRINTS if is_viewer(name) else RULES.get(name)) and not rule[1](text)
     )

@@ -60,9 +60,9 @@ def given_options() -> dict[str, str]:
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
-def choices(prefix: str) -> list[str]:
+def choices(prefix: str) -> dict[str, str]:
     """Return the options with a prefix, except options that only print."""
-    return [name for name in given_options() if name.startswith(prefix) and not table.only_prints(name)]
+    return {k: value for k, value in given_options().items() if k.startswith(prefix) and not table.only_prints(k)}
 
 
 def without_iterations() -> str:

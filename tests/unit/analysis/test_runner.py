@@ -1,5 +1,6 @@
 """The torn cell and the results folder after a run that ends early."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -36,6 +37,14 @@ def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroy
             (type(caught) is ConvergenceError and "(singular)" in str(caught)) if error is SINGULAR else caught is error
         )
     assert len(calls) == destroyed
+
+
+@pytest.mark.parametrize("options", [{}, {"feti_ksp_rtol": 1e-9, "feti_ksp_monitor": False}], ids=str)
+def test_a_result_has_the_options_that_change_more_than_the_output(options):
+    case = replace(make_case(fibre_fraction=0.4, mesh_size=0.3), petsc=options)
+    result = runner.compute(case, MPI.COMM_SELF)
+    assert result.solver.options == ({"feti_ksp_rtol": "1e-09"} if options else None)
+    assert ("options" in result.document["solver"]) == bool(options)
 
 
 def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):

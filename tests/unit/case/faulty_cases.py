@@ -11,6 +11,10 @@ NOT_TOML: dict[str, str] = {
     "not TOML: Expected one statement a line (at line 4": cell("mesh_size = 0.05", "mesh_size = 0.05 coating = 0.1"),
     "not TOML: Unterminated string (at line 18, the end": ended('[output]\nlength_unit = """'),
     "not TOML: Cannot overwrite a value (at line 5": cell("mesh_size = 0.05", "mesh_size = 0.05\nmesh_size = 0.1"),
+    '"mesh_size = 0.1"; mesh_size is given twice': cell("mesh_size = 0.05", "mesh_size = 0.05\nmesh_size = 0.1"),
+    '"mesh_size = 3 mm"; numbers have no unit, and a decimal point': cell("mesh_size = 0.05", "mesh_size = 3 mm"),
+    '"mesh_size = 0,05"; numbers have no unit, and a decimal point': cell("mesh_size = 0.05", "mesh_size = 0,05"),
+    '"mesh_size = small"; text needs quotation marks': cell("mesh_size = 0.05", "mesh_size = small"),
     "not TOML: Cannot declare ('cell',) twice (at line 17": ended("[cell]\n"),
     "not TOML": cell("0.05", "1" * 5000),
 }  # fmt: skip

@@ -194,6 +194,11 @@ def test_phases_of_mesh_and_case_must_match(tmp_path):
     assert own.material_of("fibre:2") == Isotropic(1.0, 0.0)
     with pytest.raises(CaseError, match="fibre:2"):
         check_phases(own, ["matrix", "fibre"])
+    with pytest.raises(CaseError) as caught:
+        check_phases(case, ["matrix", "surface2"])
+    missing, hint = caught.value.faults
+    assert missing == "[material.surface2]: missing section; the mesh has this phase"
+    assert hint.endswith('If they are the same, add to [cell]: phases = {fibre = "surface2"}')
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress", "generalized"])

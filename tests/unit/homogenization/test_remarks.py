@@ -39,8 +39,54 @@ def test_teeth_that_exceed_the_peak_are_a_warning_however_they_are_chosen(key):
     rho, found = 2 * 1000.0 * 1e-4 / 0.06**2, [line for line in warnings(case, 1.0, 1e-9)]
     counts = [int(re.search(r": (\d+) teeth a bond", line)[1]) for line in case_remarks(case)]
     assert len(counts) == ("teeth" not in key) and len(found) == bool(key)
+    lines = [*case_remarks(case), *case_remarks(case, bonds=70)]
+    events = [int(number) for line in lines for number in re.findall(r"up to (\d+) events", line)]
+    assert events == [70 * count for count in counts]
     excess = rho ** (1 / (2 * (counts or [3])[0])) - 1.0
     assert all(f"exceeds the peak traction by {excess:.1%}" in line for line in found) and (found or excess <= 0.02)
+
+
+@pytest.mark.parametrize(
+    ("keys", "remarked"),
+    [
+        ({"normal_strength": 50.0}, True),
+        ({"law": "bilinear", "normal_strength": 50.0, "normal_toughness": 2.0}, True),
+        ({"law": "energy", "toughness": 2.0}, False),
+        (None, False),
+    ],
+    ids=str,
+)
+def test_springs_of_bonds_that_soften_the_cell_are_remarked(keys: Any, remarked: bool) -> None:
+    """At the limit that the remark names, bonds take less than 10 % of C11; at a fiftieth of it, more than half."""
+    cell = {"geometry": "hexagonal", "fibre_fraction": 0.6, "fibre_radius": 0.008, "mesh_size": 0.1}
+    materials = {"matrix": {"young": 3500.0, "poisson": 0.35}, "fibre": {"young": 72000.0, "poisson": 0.22}}
+    parts: dict[str, Any] = {"cell": cell, "material": materials}
+
+    def with_springs(normal: float, tangential: float) -> list[str]:
+        springs = {"normal_stiffness": normal, "tangential_stiffness": tangential}
+        both = {name.replace("normal", "tangential"): value for name, value in (keys or {}).items()}
+        analysis = {"type": "path" if keys else "stiffness", "plane": "strain"}
+        more = {"path": {"strain": [0.01, 0.0, 0.0]}} if keys else {}
+        interface = springs | (keys or {}) | ({} if keys and "toughness" in keys else both)
+        case = Case.parse(parts | {"interface": interface, "analysis": analysis} | more)
+        lines = describe(case, MPI.COMM_SELF).splitlines()
+        return [line for line in lines if line.startswith("remark     [interface]") and "k r / E'" in line]
+
+    def C11(stiffness: float | None) -> float:
+        springs = {"normal_stiffness": stiffness, "tangential_stiffness": stiffness}
+        more = {} if stiffness is None else {"interface": springs}
+        case = Case.parse(parts | {"analysis": {"type": "stiffness", "plane": "strain"}} | more)
+        stiffnesses = run(case, MPI.COMM_SELF).effective_stiffness
+        assert stiffnesses is not None
+        return float(stiffnesses[0, 0])
+
+    lines = with_springs(1e8, 4e5)
+    assert len(lines) == remarked and not with_springs(1e8, 1e8)
+    if remarked:
+        assert "tangential_stiffness = 400000: k r / E' = 0.8" in lines[0] and "unit" not in lines[0]
+        assert with_springs(1e3, 1e8)[0].endswith("check the unit of length")
+        limit = float(re.search(r"from (\S+) on less than 10 %", lines[0])[1])
+        assert 0.9 < C11(limit) / C11(None) < 0.99 and C11(limit / 50.0) < 0.5 * C11(None)
 
 
 @pytest.mark.parametrize(

@@ -72,5 +72,8 @@ def test_the_keys_of_one_criterion_are_needed(keys):
         },
         "analysis": {"type": "stiffness", "plane": "strain"},
     }
-    with pytest.raises(CaseError, match=r"\[material.matrix\] strength: .*: expected the keys of one criterion"):
+    fault = r"\[material.matrix\] strength: .*: expected the keys of one criterion"
+    with pytest.raises(CaseError, match=fault) as caught:
         Case.parse(document)
+    hint = ". With tension alone write principal, or add compression"
+    assert [fault.endswith(hint) for fault in caught.value.faults] == ["tension" in keys]

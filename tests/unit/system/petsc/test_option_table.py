@@ -94,6 +94,7 @@ def test_known_names_pass(name):
     ("name", "words"),
     [
         ("log_vieww", "did you mean -log_view?"),
+        ("log_viev", "did you mean -log_view?"),
         ("options_lef", "did you mean -options_left?"),
         ("mat_type", "options that begin with -feti_"),
         ("prefix_push", "options that begin with -feti_"),

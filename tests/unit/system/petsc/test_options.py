@@ -6,7 +6,7 @@ import pytest
 from petsc4py import PETSc
 
 from feti_homog.system.petsc.option_table import only_prints
-from feti_homog.system.petsc.option_values import can_be_written, petsc_words
+from feti_homog.system.petsc.option_values import can_be_written, faulty_values, petsc_words
 from feti_homog.system.petsc.options_database import case_options
 
 
@@ -47,6 +47,12 @@ def test_the_command_line_comes_first_and_is_there_for_the_next_case(given):
 def test_only_flags_of_petsc_itself_are_settled_when_it_starts():
     words = petsc_words({"log_view": "false", "malloc_debug": "true", "feti_view": "false", "feti_pc_type": "lumped"})
     assert words == ["-malloc_debug", "-feti_view", "false", "-feti_pc_type", "lumped"]
+
+
+def test_a_missing_options_file_is_said_to_be_missing(tmp_path):
+    (tmp_path / "there").touch()
+    faults = [faulty_values({"options_file": str(tmp_path / name)})[0] for name in ("there", "none")]
+    assert [fault.endswith("there is no such file") for fault in faults] == [False, True]
 
 
 @pytest.mark.parametrize(
