@@ -1,6 +1,6 @@
 """Check links, sizes, layout and number ranges of all tables in result.h5 before other modules read it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -10,7 +10,6 @@ import numpy as np
 
 from feti_homog.case import cases
 from feti_homog.errors import CaseError
-from feti_homog.fem import assembly, shape_functions
 from feti_homog.results import field_layout, result_json
 from feti_homog.system.runtime import input_files, records
 
@@ -97,12 +96,17 @@ def _require_layout(path: Path, file: Any, state: int | None) -> None:
                 _require_values(place, name, counts, attributes[d.name or name])
 
 
+def _blocks(table: Any) -> Iterator[Any]:
+    """Yield rows of a table (n, ...), not too many at a time for the memory."""
+    for start in range(0, len(table), 1 << 16):
+        yield table[start : start + (1 << 16)]
+
+
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
     """Compare the numbers of a table or attribute with RANGES, a block of rows at a time."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
     high = counts[high] - (high != "f") if isinstance(high, str) else high
-    for start in range(0, len(table) if table.ndim else 1, assembly.ELEMENTS_AT_ONCE):
-        values = np.asarray(table[start : start + assembly.ELEMENTS_AT_ONCE] if table.ndim else table)
+    for values in map(np.asarray, _blocks(table) if table.ndim else [table]):
         is_wrong = ~((low <= values) & (values <= high)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
         if is_wrong.any():
             raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {high:g}")
@@ -119,11 +123,9 @@ def _require_mesh(path: Path, file: Any) -> None:
     span = points.max(axis=0, initial=-np.inf) - points.min(axis=0, initial=np.inf)
     if not ((size > 0.0) & (size <= 4.0 * span)).all() or len(triangles) % 4**refine or not len(triangles):
         raise CaseError(f"cannot read {path}: a cell of {size[0]:g} x {size[1]:g}, refine = {refine}, has other nodes")
-    reference, _ = shape_functions.quadrature(triangles.shape[1])
-    for start in range(0, len(triangles), assembly.ELEMENTS_AT_ONCE):
-        corners = points[triangles[start : start + assembly.ELEMENTS_AT_ONCE]]
-        (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference, (1, 1)), (1, 3), (0, 1))
-        flat += np.count_nonzero(xr * ys - yr * xs <= 1e-20 * span.prod())
+    for block in _blocks(triangles):
+        (x1, y1), (x2, y2) = (np.transpose(points[block[:, k]] - points[block[:, 0]]) for k in (1, 2))
+        flat += np.count_nonzero(x1 * y2 - x2 * y1 <= 1e-20 * span.prod())
     apart = np.stack(
         [file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")]
     )

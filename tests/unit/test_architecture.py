@@ -135,7 +135,7 @@ def test_results_are_verified_without_the_solver(tmp_path):
     assert not {"petsc4py", "mpi4py", "gmsh", "matplotlib"} & loaded
     floors = {floor_of(name.removeprefix("feti_homog.")) for name in loaded if name.startswith("feti_homog.")}
     below = "errors typing system.runtime system.parallel system.petsc schema materials case microstructure"
-    assert floors <= {*below.split(), "microstructure.shapes", "system", "verify", "api", "commands", "cli"}
+    assert floors <= {*below.split(), "microstructure.shapes", "system", "results", "verify", "api", "commands", "cli"}
 
 
 def test_only_a_rank_that_draws_loads_matplotlib():

@@ -3,8 +3,14 @@
 Imports nothing.  Main entries: `convex_sums.Outlines`, `shapes.SHAPES`.
 """
 
-from feti_homog.microstructure.shapes.convex_sums import Outlines
+from typing import TYPE_CHECKING
+
 from feti_homog.microstructure.shapes.ellipses import Conics, Discs, Ellipses, gaps
 from feti_homog.microstructure.shapes.outlines import directions, on_circle
 
 __all__ = ["Conics", "Discs", "Ellipses", "Outlines", "convex_sums", "directions", "gaps", "on_circle", "shapes"]
+
+if TYPE_CHECKING:
+    from feti_homog.microstructure.shapes.convex_sums import Outlines
+else:
+    Outlines = object  # cells without polygons do not load sums of them

@@ -95,8 +95,8 @@ PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewe
 SHOWING = re.compile(r"(^|_)(view|monitor|converged_reason|converged_rate)(_|$)|_(compute|plot)_(singular|eigen)values")
 LEVEL = re.compile(r"_(print|printstat|statprint)$|_mumps_icntl_[1-4]$")
 
-CLOSE = 0.87
-"""Least similarity (by difflib; 1 for equal names) of a misspelt name: of eight letters, one differs."""
+CLOSE = 0.9
+"""Least similarity (by difflib; 1 for equal names) of a misspelt name: one or two letters differ."""
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
@@ -110,7 +110,7 @@ def unknown_options(names: Iterable[str]) -> list[str]:
             hint = f"not an option of this program; did you mean -feti_{name}?"
         elif NOT_IN_BATCH.match(name):
             hint = "no option of a program that runs in batch"
-        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)):
+        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, 7 / 8)):
             hint = f"unknown option; did you mean -{nearest[0]}?"
         elif name not in PETSC_NAMES and not name.startswith(PETSC_BEGINNINGS):
             hint = "unknown option; solvers of this program have options that begin with -feti_"
