@@ -154,7 +154,7 @@ def test_what_is_no_folder_of_a_result_is_named(tmp_path, command):
     assert job.stderr.startswith(f"error: {path}: expected the folder of a result, not a file\n")
     (tmp_path / "fit.json").touch()
     assert f"{tmp_path} has a study: see fit.json and fit.png" in command_line(1, command, tmp_path).stderr
-    (tmp_path / "sweep.json").touch()
+    (tmp_path / "fit.json").rename(tmp_path / "sweep.json")
     job = command_line(1, command, tmp_path)
     assert job.returncode == 2 and "not that of a sweep; `feti-homog collect" in job.stderr
 
