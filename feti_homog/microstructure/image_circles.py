@@ -34,8 +34,11 @@ def round_fibres(image: Float) -> Float:
     return max(sides, key=lambda side: side[0])[1]
 
 
-def _candidates(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[Float, Float]:
-    """Find circles (k, 3), and the numbers (k,) of edges whose normals lead to the centres.  Arguments as `_fitted`."""
+def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, Float]:
+    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` pixels.
+
+    Returns the part of the edges on circles, and the circles (k, 3).
+    """
     radius, peaks = SMALLEST, [np.zeros((0, 4))]
     while radius < min(size) / 2:
         # Bins of votes grow with the radius, as the errors of normals do; around a centre there are few other votes.
@@ -49,17 +52,8 @@ def _candidates(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[Flo
         centre = (np.column_stack([column, row]) - 1.5) * width
         peaks.append(np.column_stack([centre, np.full(len(row), radius), votes[row, column]]))
         radius *= 1.1
-    circles, votes = np.split(np.concatenate(peaks), [3], axis=1)
-    return circles, votes[:, 0]
-
-
-def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, Float]:
-    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` pixels.
-
-    Returns the part of the edges on circles, and the circles (k, 3).
-    """
-    circles, counts = _candidates(edges, inward, size)
-    excess, part = _excess(circles, counts, size, 0.15), 0.0
+    circles, counts = np.split(np.concatenate(peaks), [3], axis=1)
+    excess, part = _excess(circles, counts[:, 0], size, 0.15), 0.0
     circles, excess = circles[excess > 0.3], excess[excess > 0.3]
     for reach, least in FITS:
         circles = circles[_apart(circles, excess)]

@@ -14,30 +14,30 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
-# begun runs, messages, further starts of fits, checks of checkpoints; the third: conductivity, images, boundaries,
-# and of results the ranges of numbers that verify compared before.
+# begun runs, messages, starts and steps of fits, soft springs, checks of checkpoints; the third: conductivity, images,
+# boundaries, ranges of numbers in results that verify compared before.
 LINES = {
     ".": 470,
-    "analysis": 3000 + 115 + 125,
+    "analysis": 3000 + 115 + 100,
     "case": 2880 + 25 + 120,
-    "commands": 560 + 10 + 75,
+    "commands": 560 + 10 + 65,
     "fem": 1150 + 3 + 11,
-    "feti": 6300 + 0 + 75,
-    "homogenization": 3230 + 42 + 20,
-    "interface": 4000 + 0 - 15,
-    "materials": 1430 + 52 + 135,
-    "mesh": 5500 + 0 + 255,
+    "feti": 6300 + 0 + 50,
+    "homogenization": 3230 + 48 + 20,
+    "interface": 4000 + 0 - 18,
+    "materials": 1430 + 52 + 122,
+    "mesh": 5500 + 0 + 288,
     "microstructure": 2140 + 0 + 80,
-    "report": 3420 + 150 + 124,
+    "report": 3420 + 150 + 106,
     "results": 2430 + 110 + 40,
     "schema": 430 + 0 + 5,
-    "studies": 2950 + 55 + 4,
-    "system": 1770 + 8,
+    "studies": 2950 + 70 + 4,
+    "system": 1770,
     "verify": 3100 + 150 + 76,
 }
 FILES, TOTAL = 310, 45000 + 368 + 1132
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 6.3, 6.0
+CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
 CONSTANTS, SHARED = 340, 217
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.
