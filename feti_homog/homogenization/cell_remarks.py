@@ -128,9 +128,10 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
     """
     lines, radii = list[str](), radii[np.isfinite(radii)]
     for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):
+        if not any(getattr(bond, name) for name in bond_laws.STRENGTHS):
+            continue
         k, name = min((getattr(bond, name) or math.inf, name) for name in bond_laws.STIFFNESSES)
-        ratio = k * radii.mean() / _modulus(case, "matrix")
-        if ratio < 50.0 and any(getattr(bond, name) for name in bond_laws.STRENGTHS):
+        if (ratio := k * radii.mean() / _modulus(case, "matrix")) < 50.0:
             line = f"[{section}] {name} = {k:g}: k r / E' = {ratio:.2g}, so the springs take part of the deformation; "
             unit = "; check the unit of length" if ratio < 0.1 else ""
             lines.append(f"{line}from {50.0 * k / ratio:.2g} on less than 10 %{unit}")
