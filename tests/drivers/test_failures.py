@@ -106,7 +106,7 @@ def test_a_rank_that_is_killed_within_a_collective_call_ends_the_job(tmp_path, w
 WITHOUT_MEMORY = {
     "assembly": (2, "feti.decomposition.subdomain:Subdomain.build"),
     "factorization": (1, "feti.operators.interface_operators:_factor"),
-    "Schur complement": (2, "feti.operators.one_subdomain:schur_complement"),
+    "Schur complement": (2, "feti.linalg.dense_matrices:schur_complement"),
     "coarse space": (1, "feti.coarse.natural:assemble_owned_rows"),
     "field file": (1, "results.field_file:_write_rows"),
     "contact": (2, "interface.contact.contact_problem:kkt_errors"),
