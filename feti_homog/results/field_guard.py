@@ -105,9 +105,9 @@ def _blocks(table: Any) -> Iterator[Any]:
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
     """Compare the numbers of a table or attribute with RANGES, a block of rows at a time."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
-    high = counts[high] - (high != "f") if isinstance(high, str) else high
+    high = np.float64(counts[high] - (high != "f") if isinstance(high, str) else high)
     for values in map(np.asarray, _blocks(table) if table.ndim else [table]):
-        is_wrong = ~((low <= values) & (values <= high)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
+        is_wrong = ~((np.float64(low) <= values) & (values <= high)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
         if is_wrong.any():
             raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {high:g}")
 
