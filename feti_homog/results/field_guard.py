@@ -105,11 +105,11 @@ def _blocks(table: Any) -> Iterator[Any]:
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
     """Compare the numbers of a table or attribute with RANGES, a block of rows at a time."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
-    high = np.float64(counts[high] - (high != "f") if isinstance(high, str) else high)
+    top = np.float64(counts[high] - (high != "f") if isinstance(high, str) else high)
     for values in map(np.asarray, _blocks(table) if table.ndim else [table]):
-        is_wrong = ~((np.float64(low) <= values) & (values <= high)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
+        is_wrong = ~((np.float64(low) <= values) & (values <= top)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
         if is_wrong.any():
-            raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {high:g}")
+            raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {top:g}")
 
 
 def _require_mesh(path: Path, file: Any) -> None:
@@ -125,7 +125,7 @@ def _require_mesh(path: Path, file: Any) -> None:
         raise CaseError(f"cannot read {path}: a cell of {size[0]:g} x {size[1]:g}, refine = {refine}, has other nodes")
     for block in _blocks(triangles):
         (x1, y1), (x2, y2) = (np.transpose(points[block[:, k]] - points[block[:, 0]]) for k in (1, 2))
-        flat += np.count_nonzero(x1 * y2 - x2 * y1 <= 1e-20 * span.prod())
+        flat += int(np.count_nonzero(x1 * y2 - x2 * y1 <= 1e-20 * span.prod()))
     gap = np.stack([file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")])
     phases, labels = file.attrs["phases"], [state.attrs["label"] for state in file.get("state", {}).values()]
     for holds, fault in (
