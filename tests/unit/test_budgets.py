@@ -23,7 +23,7 @@ LINES = {
     "commands": 560 + 10 + 65,
     "fem": 1150 + 3 + 11,
     "feti": 6300 + 0 + 50,
-    "homogenization": 3230 + 48 + 20,
+    "homogenization": 3230 + 49 + 20,
     "interface": 4000 + 0 - 18,
     "materials": 1430 + 52 + 122,
     "mesh": 5500 + 0 + 288,
