@@ -17,7 +17,9 @@ BIG = changed(("mesh_size = 0.05", "mesh_size = 0.003"), end="[output]\npictures
 NOBODY = "setpriv --reuid=65534 --regid=65534 --clear-groups"
 RUN, IN_OUT = "feti run c.toml --out out", "feti run ../c.toml --out ."
 # Without what mpirun prints after its ranks: blocks between two lines, and errors of its own.
-QUIET_MPI = "{{ mpirun --oversubscribe {} 2>&1 1>&3 | sed '/^---/,/^---/d; /PMIX ERROR/d' >&2; exit ${{PIPESTATUS[0]}}; }} 3>&1"
+QUIET_MPI = (
+    "{{ mpirun --oversubscribe {} 2>&1 1>&3 | sed '/^---/,/^---/d; /PMIX ERROR/d' >&2; exit ${{PIPESTATUS[0]}}; }} 3>&1"
+)
 # A file system in memory of so many bytes or files; it ends with the shell, which has its own.
 DISK = "mkdir out/disk && mount -t tmpfs -o {} none out/disk && "
 LIMITS: dict[str, tuple[str, str, tuple[int, ...]]] = {
