@@ -32,7 +32,7 @@ setup(
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
         "progress": ["tqdm>=4.64"],  # a progress bar on terminals
-        "images": ["scikit-image>=0.22"],  # smooth outlines in images, and fibres found in them
+        "images": ["scikit-image>=0.22"],  # smooth outlines in images
         "dev": [
             "tqdm>=4.64",
             "scikit-image>=0.22",

@@ -155,9 +155,10 @@ def envelope(
     count: int,
     seed: int = 0,
 ) -> Envelope:
-    """Compare a function (m,) of a pattern with the same function of `count` simulated patterns.
+    """Compare a summary function of a pattern with `count` simulations.
 
-    The test by the largest deviation is exact: under the model all the functions are exchangeable [Ripley 1977].
+    `function` returns (m,) for a pattern.  The test by the largest deviation is exact: under the model all the
+    functions are exchangeable [Ripley 1977].
     """
     generator = np.random.default_rng(seed)
     every = np.array([function(pattern), *(function(simulate(pattern, generator)) for _ in range(count))])

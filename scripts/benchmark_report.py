@@ -63,9 +63,9 @@ class Row:
 
 
 def compare(rows: Sequence[Row]) -> None:
-    """Compute the `difference` of each row from a reference in the same plane state, and mark wrong results.
+    """Compute the `difference` of each row from its reference, and mark wrong results.
 
-    The reference is the first direct solver that has finished, or else the first tool.
+    The reference is the first direct solver that has finished in the same plane state, or else the first tool.
     """
     done = [row for row in rows if row.status == "done"]
     for row in done:
@@ -80,7 +80,10 @@ def compare(rows: Sequence[Row]) -> None:
 
 
 def table(rows: Sequence[Row]) -> list[str]:
-    """Return the rows as aligned lines, with ratios of this program to each tool in the same plane state."""
+    """Return aligned lines of the rows, with ratios of this program to each tool.
+
+    Both tools of a ratio solve the same plane state.
+    """
     lines = [
         f"{'':47}{'seconds':^50}{'':14}{'':9}  feti / tool",
         f"{'tool@ranks':14}{'dofs':>9}{'domains':>9}  {'plane':<12}{'loads':>5}" + "".join(f"{s:>9}" for s in STAGES)

@@ -1,7 +1,8 @@
-"""Compare the times of a sweep on one rank, a sweep with a case on each rank, and a CHOLMOD loop on the same meshes.
+"""Compare the times of sweeps and of a CHOLMOD loop on the same meshes.
 
-All three are whole commands, start-up included, run in turns. The loop only meshes, assembles, factors and solves: it
-writes nothing and estimates no errors. Processor time, which other programs change least, is summed over all ranks.
+One sweep runs on one rank, one has a case on each rank. All three are whole commands, start-up included, run in turns.
+The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor
+time, which other programs change least, is summed over all ranks.
 """
 
 import argparse

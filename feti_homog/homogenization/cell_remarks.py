@@ -7,7 +7,7 @@ import numpy as np
 from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials import engineering_constants, laws
-from feti_homog.mesh import Torus, mesh_fibres, submeshes
+from feti_homog.mesh import Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
@@ -53,15 +53,15 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
     return lines
 
 
-def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List the remarks on a mesh and its interfaces.
+def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
+    """List remarks on a mesh, interfaces without effect or with soft springs, and nodes that never part.
 
-    They concern the mesh, interfaces without effect or too soft, and nodes that never part; `pairs` as in `pairs_of`.
+    `pairs` as in `pairs_of`, `radii` as in `soft_springs`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
-    lines += soft_springs(case, mesh_fibres.fibre_circles(torus)[mesh_fibres.fibre_numbers(torus)[1], 2])
+    lines += soft_springs(case, radii)
     can_open = any((case.arcs, has_curve, phase_laws.has_springs(case), case.section.breaks))
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")

@@ -149,7 +149,7 @@ def distribute(
         pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, pieces, n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
-    notes = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
+    radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
     bonds = _interface_nodes(torus, pairs, lattice, pinned) if across or len(case.interfaces) else 0
     summary = CellSummary(
         width=mesh.width,
@@ -169,8 +169,8 @@ def distribute(
         snapped=mesh.snapped,
         origin=mesh.origin,
         voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
-        match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs), *notes),
+        match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], radii),
+        remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs, radii), *text),
         shift=mesh.shift,
         across=across,
         interface_nodes=bonds if across else None,

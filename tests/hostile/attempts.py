@@ -16,7 +16,7 @@ BEGINNINGS = ("error: ", "warning: ", "interrupted by ")
 
 
 class Outcome(NamedTuple):
-    """What is wrong with the end of an attempt, and the seconds of the processor and MiB that it took."""
+    """The faults of an attempt, its processor time in seconds, and its memory in MiB."""
 
     faults: list[str]
     seconds: float = 0.0

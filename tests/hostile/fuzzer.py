@@ -46,7 +46,7 @@ Case = tuple[tuple[str, ...], dict[str, Content]]
 
 
 def attempts(prepared: Path, count: int, seed: int) -> Iterator[Attempt]:
-    """Yield so many damaged inputs, of all kinds in turn, each of which has odd and even numbers."""
+    """Yield `count` damaged inputs; the kinds take turns, so that jobs with every other input have all kinds."""
     rng, kinds = np.random.default_rng(seed), list(KINDS.items())
     for number in range(count):
         kind, make = kinds[(number + number // len(kinds)) % len(kinds)]
@@ -150,7 +150,7 @@ def _fields(prepared: Path, rng: np.random.Generator) -> Case:
 
 
 def _change_tables(file: h5py.File, rng: np.random.Generator) -> None:
-    """Replace numbers of one to three tables or attributes by others of the same type, or move rows."""
+    """Damage one to three tables or attributes: replace numbers, or exchange rows.  Types stay."""
     tables, groups = list[h5py.Dataset](), [file["/"], *file.get("state", {}).values()]
     file.visititems(lambda _, entry: tables.append(entry) if isinstance(entry, h5py.Dataset) and entry.size else None)
     for _ in range(rng.integers(1, 4)):

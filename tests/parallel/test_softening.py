@@ -62,7 +62,7 @@ KINDS = ("stiffness", "strength", "toughness")
 
 
 def test_a_running_path_shows_how_many_bonds_are_damaged(comm, monkeypatch):
-    """Each event breaks the next tooth of a bond: the number is at most that of teeth, and never 0 after the first."""
+    """From the second event on, at least one bond and at most one bond per broken tooth is damaged."""
     calls = list[tuple[str, float]]()
 
     @contextmanager
