@@ -45,6 +45,27 @@ def test_traces_are_piecewise_linear_along_the_coarse_edges(torn, enough, order)
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
+def test_coarse_boundaries_have_traces_of_every_second_vertex(torn):
+    """Every other vertex has the mean of both neighbours on the boundary."""
+    cell = torn(**traced(0, order=1, refine=0))
+    sizes = np.zeros(2)
+    for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
+        nodes, sub = dofs[::2] // 2, s.submesh
+        P = trace_space(sub, s.mesh.lattice, s.problem, nodes, 0).toarray()
+        assert np.array_equal(P[::2, ::2], P[1::2, 1::2]) and not P[::2, 1::2].any() and not P[1::2, ::2].any()
+        P = P[::2, ::2]
+        kept = P.max(axis=1) == 1.0
+        assert np.array_equal(P[kept], np.eye(kept.sum()))
+        alone = np.bincount(sub.edge_class[sub.triangle_edges].ravel())[sub.edge_class] == 1
+        lines = {frozenset(ends) for ends in sub.vertex_class[sub.edges[alone]].tolist()}
+        for node, row in zip(nodes[~kept], P[~kept], strict=True):
+            at = np.flatnonzero(row)
+            assert row[at].tolist() == [0.5, 0.5]
+            assert all(frozenset((int(node), int(end))) in lines for end in nodes[kept][at])
+        sizes += P.shape
+    assert sizes[1] < 0.6 * sizes[0]
+
+
 def test_traces_of_few_dofs_keep_them_all(torn):
     cell = torn(**traced(0, order=1, refine=2))
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):

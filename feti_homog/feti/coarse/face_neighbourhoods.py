@@ -8,14 +8,16 @@ So every soft displacement of the body is soft in a neighbourhood, which may hav
 all nodes off the face fixed, the face is stiffer than in the body: S restricted to the face <= S_fixed.
 
 Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
-P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges.
+P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges; without nodes on edges,
+at every second vertex.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.fem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -35,6 +37,9 @@ def trace_space(
     that are not boundary nodes have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
+    if not inner:
+        every_second = _every_second(submesh, nodes) if c * len(nodes) >= 2 * min_dofs else identity(len(nodes))
+        return kron(every_second, identity(c)).tocsr()
     on_edge = nodes >= vertices
     edge, position = np.divmod(nodes - vertices, max(inner, 1))
     position += 1
@@ -64,6 +69,20 @@ def trace_space(
     rows, columns, values = rows[is_free], columns[is_free], values[is_free]
     entries = np.repeat(values, c), (problem.dofs(rows), problem.dofs(columns))
     return csr_matrix(entries, shape=(c * len(nodes), c * m))
+
+
+def _every_second(submesh: Submesh, nodes: Int) -> csr_matrix:
+    """Interpolate boundary vertices `nodes` (n,) between every second vertex along the boundary: (n, m)."""
+    one_sided = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1
+    ends = submesh.vertex_class[submesh.edges[one_sided[submesh.edge_class]]]
+    rows, columns = np.searchsorted(nodes, ends[np.isin(ends, nodes).all(axis=1)]).T
+    beside = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(nodes),) * 2).tocsr()
+    beside += beside.T
+    start = np.unique(connected_components(beside, directed=False)[1], return_index=True)[1]
+    is_odd = dijkstra(beside, indices=start, unweighted=True, min_only=True) % 2 == 1
+    # Ends and forks of lines remain, and neighbours at odd distances, where a closed line has an odd length.
+    between = is_odd & (np.diff(beside.indptr) == 2) & (beside @ is_odd == 0)
+    return (diags(1.0 - between) + diags(between / 2) @ beside).tocsr()[:, ~between]
 
 
 @dataclass(frozen=True)
