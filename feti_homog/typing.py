@@ -15,7 +15,6 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 Int32 = NDArray[np.int32]
-Index = NDArray[np.intp]  # as NumPy itself numbers
 Bool = NDArray[np.bool_]
 AnyInt = NDArray[np.integer[Any]]
 Array = NDArray[Any]

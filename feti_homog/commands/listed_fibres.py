@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.analysis import stored_result
 from feti_homog.case import cases, cell_section
 from feti_homog.errors import CaseError
-from feti_homog.mesh import Torus, arrange, coarse_mesh, mesh_fibres
+from feti_homog.mesh import Torus, arrange, mesh_fibres
 from feti_homog.mesh.fill import gmsh_mesher, pixel_mesher
 from feti_homog.microstructure import periodic_table
 from feti_homog.microstructure.shapes import Ellipses, shapes
@@ -135,7 +135,7 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
         )
         coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
         phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-        angles, has_voids = np.zeros(len(phases)), coarse_mesh.voids(mesh) > 0
+        angles, has_voids = np.zeros(len(phases)), bool(torus.voids)
         return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, angles, mesh.origin, has_voids)
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)

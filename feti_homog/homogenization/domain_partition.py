@@ -9,7 +9,7 @@ from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
 from feti_homog.homogenization import cell_remarks, partition_policy
-from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, coarse_mesh, mesh_fibres, submeshes
+from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, mesh_fibres, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.tiles import tile_filling
 from feti_homog.microstructure.shapes import Ellipses
@@ -141,15 +141,17 @@ def distribute(
         moved, faults = arc_selection.checked(case, nodes, centres[is_fibre], faults)
     if faults:
         raise CaseError(*faults)
+    triangles = len(mesh.triangles) * (halves := mesh.triangles.shape[1] - 2)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, across = int(parts.max()) + 1, (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
-        pieces = partition_policy.wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
-        cut = partition.decompose(torus, parts, pieces, n_ranks)
+        load = np.bincount(parts)
+        pieces = partition_policy.wanted_pieces(case, halves * load, shared_edges, lattice, n_ranks, policy)
+        cut = partition.decompose(torus, parts, np.minimum(pieces, load), n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
-    radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), len(mesh.triangles))
+    radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
     bonds = _interface_nodes(torus, pairs, lattice, pinned) if across or len(case.interfaces) else 0
     summary = CellSummary(
         width=mesh.width,
@@ -157,7 +159,7 @@ def distribute(
         phases=mesh.phases,
         bodies=bodies,
         subdomains=len(cut.rank),
-        coarse_triangles=len(mesh.triangles),
+        coarse_triangles=triangles,
         interface_edge=float(torus.edge_lengths[torus.is_outline].max(initial=0.0)),
         numbers=numbers,
         is_fibre=is_fibre,
@@ -168,7 +170,7 @@ def distribute(
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
         origin=mesh.origin,
-        voids=coarse_mesh.voids(mesh) if torus.at_void.any() else 0,
+        voids=torus.voids,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], radii),
         remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs, radii), *text),
         shift=mesh.shift,
@@ -221,15 +223,14 @@ def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
     """Cut the cell across materials; return None if the policy or METIS prevents the cut."""
-    triangles = len(torus.mesh.triangles)
-    dofs = triangles * lattice.intervals**2
-    is_image = case.cell.geometry == "pixels" and not case.cell.smooth
+    elements, corners = torus.mesh.triangles.shape
+    dofs, is_image = elements * (corners - 2) * lattice.intervals**2, corners == 4
     pieces = policy.across_pieces(dofs, n_ranks, is_image) if partition_policy.can_be_cut_across(case) else 0
-    if not 0 < pieces <= triangles:
+    if not 0 < pieces <= elements:
         return None
     if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):
         return strips
-    parts, counts = np.zeros(triangles, np.int64), np.array([pieces])
+    parts, counts = np.zeros(elements, np.int64), np.array([pieces])
     if is_image and pieces > n_ranks:
         parts, counts = partition.blocks(torus.mesh, pieces)
     cut = partition.decompose(torus, parts, counts, n_ranks)

@@ -4,14 +4,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from feti_homog.microstructure.shapes import Ellipses
-from feti_homog.typing import Bool, Float, Index, Int, Int32
+from feti_homog.typing import Bool, Float, Int, Int32
 
 # Distance / cell size below which two nodes coincide: files may round coordinates.
 SAME_PLACE = 1e-7
+# The triangles on either side of the diagonal 02, and on either side of the diagonal 13.
+HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
@@ -47,7 +47,8 @@ class CoarseMesh:
     Attributes:
         width, height: cell periods.
         points: (n, 2) nodes in the plane.
-        triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.
+        triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
+            square pixels, the lower left corner first, from which `submeshes.halved` makes triangles.
         phase: (m,) index into `phases`, whose first name is "matrix".
         precedence: (m,) order for the numbers of constituents, 0 in the matrix: the fibre number, or the phase where
             fibres have no number.
@@ -112,8 +113,8 @@ def areas(points: Float, triangles: Int32) -> Float:
 
 
 def edges(triangles: Int32) -> Int32:
-    """List the directed edges (3m, 2); edge 3 t + i is opposite to corner i of triangle t."""
-    return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
+    """List the directed edges (3m, 2) or (4m, 2); edge 3 t + i is opposite to corner i of triangle t."""
+    return np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
 
 
 def edge_keys(pairs: Int32, nodes: int) -> Int:
@@ -179,51 +180,3 @@ def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: in
     shared = (np.roll(circle, -1, axis=1) == np.roll(circle, 1, axis=1)) & (np.roll(circle, 1, axis=1) >= 0)
     bad = np.flatnonzero(shared.any(axis=1))
     return bad.astype(np.int32), np.argmax(shared[bad], axis=1).astype(np.int32)
-
-
-def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Find the edges (k, 2) between phases or beside voids, on sides the left or lower copy."""
-    pairs, order, alone = _neighbours(mesh)
-    between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return np.concatenate([pairs[order[between, 0]], pairs[alone]])
-
-
-def void_edges(mesh: CoarseMesh) -> Int32:
-    """Find the edges (k, 2) beside voids, on sides the left or lower copy."""
-    pairs, _, alone = _neighbours(mesh)
-    return np.asarray(pairs[alone])
-
-
-def voids(mesh: CoarseMesh) -> int:
-    """Count the connected boundaries of voids on the torus."""
-    classes, ends = np.unique(mesh.representative[void_edges(mesh)], return_inverse=True)
-    graph = coo_matrix((np.ones(ends.size // 2), tuple(ends.reshape(-1, 2).T)), shape=(len(classes),) * 2)
-    return int(connected_components(graph, directed=False)[0])
-
-
-def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
-    """Return whether edges (k, 2), on sides of either copy, lie between fibre and matrix."""
-    low_copies, order, _ = _neighbours(mesh)
-    in_matrix = mesh.phase[order // 3] == 0
-    between, n = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]], len(mesh.points)
-    return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
-
-
-def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index, Bool]:
-    """Return triangle edges (3m, 2) as lower copies, pairs (e, 2) of equal edges, and a mask (3m,) of single edges."""
-    pairs = _low_copies(mesh, edges(mesh.triangles))
-    order, alone = np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1), np.ones(len(pairs), bool)
-    alone[order] = False
-    if mesh.boundary != "periodic":
-        alone &= ~on_sides(mesh.points[pairs], mesh.period)
-    return pairs, order, alone
-
-
-def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:
-    """Move edges (k, 2) on the right or upper side to the opposite side."""
-    for axis, low, high in paired_sides(mesh.points, mesh.shift):
-        partner = np.arange(len(mesh.points), dtype=np.int32)
-        partner[high] = low
-        on_high = np.all(mesh.points[pairs, axis] == mesh.period[axis], axis=1)
-        pairs = np.where(on_high[:, None], partner[pairs], pairs)
-    return pairs

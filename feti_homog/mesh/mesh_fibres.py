@@ -71,7 +71,7 @@ def fibre_circles(torus: Torus) -> Float:
     not_round = np.isnan(circles[:, 2]) & (torus.constituent_phase > 0)
     inside = np.flatnonzero((not_round & ~reaches_side)[torus.constituent])
     triangles, body = mesh.triangles[inside], torus.constituent[inside]
-    weights, middles = areas(mesh.points, triangles), sum(mesh.points[corner] for corner in triangles.T) / 3
+    weights, middles = areas(mesh.points, triangles), sum(mesh.points[k] for k in triangles.T) / triangles.shape[1]
     area, *moments = (np.bincount(body, weights * x, n) for x in (1.0, *middles.T))
     circles[area > 0, :2] = (np.array(moments)[:, area > 0] / area[area > 0]).T
     for submesh in cut_bodies(torus, np.flatnonzero((not_round & reaches_side)[torus.constituent])):

@@ -27,10 +27,10 @@ class Torus:
     """The node classes, torus edges and constituents of a coarse mesh.
 
     Attributes:
-        mesh: the plane mesh of m triangles, or some tiles of a larger mesh.
+        mesh: the plane mesh of m triangles or pixels, or some tiles of a larger mesh.
         node_class: (n,) class of each plane node.
         edges: (e, 2) plane edges in ascending order of nodes, from the lexicographically lower to the upper end.
-        triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
+        triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3); (m, 4) for pixels.
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
@@ -54,7 +54,7 @@ class Torus:
         """Identify the periodic images of a mesh, and number the constituents."""
         node_class = present(mesh.representative, len(mesh.points))[1]
         edges, triangle_edges = plane_edges_of(mesh)
-        low_edge = representatives(mesh.points[edges].mean(axis=1), *mesh.shift)
+        low_edge = representatives((mesh.points[edges[:, 0]] + mesh.points[edges[:, 1]]) / 2, *mesh.shift)
         torus_edge = present(low_edge, len(edges))[1]
         one, other = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[one] == mesh.phase[other]
@@ -68,7 +68,7 @@ class Torus:
         circle = np.full(len(edges), len(mesh.ellipses))
         circle[torus.arcs] = mesh.arc_circle
         first = np.full(label.max() + 1, len(mesh.ellipses))
-        np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
+        np.minimum.at(first, label, circle[triangle_edges].min(axis=1))
         order = np.lexsort((first[label], mesh.precedence))
         return replace(torus, constituent=renumber(label, order))
 
@@ -90,6 +90,17 @@ class Torus:
         mask = self.at_void.copy()
         mask[edge] = self.mesh.phase[one] != self.mesh.phase[other]
         return mask
+
+    def low_copies(self, chosen: Bool) -> Int32:
+        """Return the ends (k, 2) of `chosen` torus edges, on sides of the left or lower copy."""
+        is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
+        return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
+
+    @property
+    def voids(self) -> int:
+        """The number of connected boundaries of voids."""
+        classes, ends = np.unique(self.edge_ends[self.at_void], return_inverse=True)
+        return int(components(len(classes), *ends.reshape(-1, 2).T).max(initial=-1)) + 1
 
     @cached_property
     def debonded(self) -> Bool:
@@ -179,13 +190,16 @@ class Torus:
     def plane_edges(self, pairs: Int32) -> Int:
         """Find the plane edge (k,) between each pair (k, 2) of plane nodes."""
         n = len(self.mesh.points)
+        if not len(pairs):
+            return np.zeros(0, np.int64)
         return np.asarray(np.searchsorted(np.sort(self.edges, axis=1) @ [n, 1], edge_keys(pairs, n)))
 
     @cached_property
     def constituent_phase(self) -> Int:
         """The phase number (constituents,) of each constituent."""
-        first = np.unique(self.constituent, return_index=True)[1]
-        return np.asarray(self.mesh.phase[first], np.int64)
+        phase = np.zeros(self.constituent.max(initial=-1) + 1, np.int64)
+        phase[self.constituent] = self.mesh.phase
+        return phase
 
     @cached_property
     def nesting(self) -> Int:
@@ -222,8 +236,8 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     edges, sides = triangle_edges.ravel(), np.arange(triangle_edges.size)
     first, last = np.zeros((2, edges.max(initial=-1) + 1), np.int64)
     first[edges[::-1]], last[edges] = sides[::-1], sides
-    is_shared = first != last
-    return first[is_shared] // 3, last[is_shared] // 3
+    is_shared, corners = first != last, triangle_edges.shape[1]
+    return first[is_shared] // corners, last[is_shared] // corners
 
 
 def components(n: int, one: Int, other: Int) -> Int:
@@ -268,4 +282,4 @@ def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
     (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
     backwards = (xa > xb) | ((xa == xb) & (ya > yb))
     edges[backwards] = edges[backwards, ::-1]
-    return edges, which.reshape(-1, 3)
+    return edges, which.reshape(mesh.triangles.shape)

@@ -8,18 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import on_sides
+from feti_homog.mesh.coarse_mesh import HALVES, on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
 # The arrays of a submesh with a row for each triangle, vertex, plane edge, class and torus edge, but index arrays.
 ROWS = (
-    ("constituent", "backwards"),
+    ("constituent",),
     ("points",),
     ("circles", "turns"),
     ("touching", "class_keys"),
     ("at_void", "debonded", "edge_keys"),
 )
+# The edges of `coarse_mesh.HALVES`; the diagonal is edge 4.
+SIDES = np.array([[[0, 1, 4], [4, 2, 3]], [[0, 4, 3], [1, 2, 4]]])
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,6 @@ class Submesh:
         points: (v, 2) positions of the vertices in the plane.
         triangles: (t, 3) vertices, counter-clockwise.
         triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
-        backwards: (t, 3) true where the triangle traverses an edge from the end to the start.
         edges: (e, 2) start and end vertices.
         circles: (e, 3) centre and radius of the circle of each edge; radius NaN on ellipses, 0 for straight edges.
         turns: (e,) increment of the ellipse parameter along each edge; 0 for straight edges.
@@ -60,7 +61,6 @@ class Submesh:
     points: Float
     triangles: Int
     triangle_edges: Int
-    backwards: Bool
     edges: Int
     circles: Float
     turns: Float
@@ -75,6 +75,11 @@ class Submesh:
     origin: Float
     pinned: Int
     boundary: str
+
+    @property
+    def backwards(self) -> Bool:
+        """The mask (t, 3) of edges that a triangle traverses from the end to the start."""
+        return np.asarray(self.edges[self.triangle_edges, 0] != self.triangles)
 
     @property
     def at_side(self) -> Bool:
@@ -106,8 +111,8 @@ class SubdomainTable:
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
         """Make the table of a cell from the subdomain (m,) of each triangle, numbered without gaps."""
-        first = np.unique(subdomain, return_index=True)[1]
-        body = np.zeros(len(first), np.int64) if across else torus.constituent[first]
+        body = np.zeros(subdomain.max() + 1, np.int64)
+        body[subdomain] = 0 if across else torus.constituent
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
 
 
@@ -116,8 +121,8 @@ class SubmeshesOfRank:
     """The subdomains of a rank as one submesh, before `cut`.
 
     Attributes:
-        whole: all triangles of the rank as one submesh.
-        member: (t,) subdomain of each triangle, counted on this rank.
+        whole: all triangles, or pixels (t, 4), of the rank as one submesh.
+        member: (t,) subdomain of each triangle or pixel, counted on this rank.
         index, body, phase: attributes of each subdomain, as in `Submesh`.
     """
 
@@ -129,13 +134,14 @@ class SubmeshesOfRank:
 
     @property
     def loads(self) -> Int:
-        """The load (s,) of each subdomain: its number of coarse triangles."""
+        """The load (s,) of each subdomain: its number of coarse triangles or pixels."""
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
         """Cut the triangles of the rank into one submesh for each subdomain."""
         members = np.split(np.argsort(self.member, kind="stable"), np.cumsum(self.loads))[:-1]
-        pieces = [part(self.whole, triangles) for triangles in members]
+        is_image = self.whole.triangles.shape[1] == 4
+        pieces = [halved(piece) if is_image else piece for piece in (part(self.whole, some) for some in members)]
         table = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
         return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in table]
 
@@ -171,16 +177,39 @@ def part(submesh: Submesh, members: Int) -> Submesh:
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
     torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
+    number = np.zeros(len(submesh.points), np.int64)
+    number[vertices] = np.arange(len(vertices))
     rows = zip((members, vertices, edges, classes, torus_edges), ROWS, strict=True)
     return replace(
         submesh,
         **{name: getattr(submesh, name)[some] for some, names in rows for name in names},
         triangles=triangles,
         triangle_edges=triangle_edges,
-        edges=np.searchsorted(vertices, submesh.edges[edges]),
+        edges=number[submesh.edges[edges]],
         vertex_class=vertex_class,
         edge_class=edge_class,
         pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),
+    )
+
+
+def halved(pixels: Submesh) -> Submesh:
+    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals, which join nodes of an even sum of row and column."""
+    corners, m = pixels.triangles, len(pixels.triangles)
+    low = pixels.points[corners[:, 0]]
+    is_odd = (np.rint(low.sum(axis=1) / np.ptp(pixels.points[corners[0], 0])) % 2).astype(np.int64)
+    sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
+    # The class of the lower left corner numbers a diagonal, behind the edges of all pixels.
+    keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
+    names = ("circles", "turns", "at_void", "debonded")
+    diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}
+    diagonals |= {"edge_keys": np.iinfo(np.int32).max + keys, "edge_class": len(pixels.edge_keys) + place}
+    diagonals["edges"] = np.where(is_odd[:, None] == 1, corners[:, [3, 1]], corners[:, [0, 2]])
+    return replace(
+        pixels,
+        **{name: np.concatenate([getattr(pixels, name), rows]) for name, rows in diagonals.items()},
+        constituent=np.repeat(pixels.constituent, 2),
+        triangles=np.take_along_axis(corners[:, None], HALVES[is_odd], axis=2).reshape(-1, 3),
+        triangle_edges=np.take_along_axis(sides[:, None], SIDES[is_odd], axis=2).reshape(-1, 3),
     )
 
 
@@ -212,7 +241,8 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
     distance = np.full(len(torus.class_keys), np.inf)
     np.minimum.at(distance, torus.node_class, np.hypot(*offset.T))
-    best = np.lexsort((distance, unfit))[:1].tolist()
+    fit = np.flatnonzero(unfit == unfit.min(initial=np.iinfo(unfit.dtype).max))
+    best = fit[distance[fit] == distance[fit].min(initial=np.inf)][:1].tolist()
     return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 
 
@@ -227,7 +257,6 @@ def _whole(torus: Torus, pinned: Int) -> Submesh:
         points=mesh.points,
         triangles=mesh.triangles.astype(np.int64),
         triangle_edges=torus.triangle_edges,
-        backwards=torus.edges[torus.triangle_edges, 0] != mesh.triangles,
         edges=torus.edges,
         circles=torus.edge_circles,
         turns=torus.edge_turns,

@@ -66,13 +66,10 @@ def halves(torus: Torus) -> Partition | None:
 
 
 def blocks(mesh: CoarseMesh, count: int) -> tuple[Int, Int]:
-    """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`.
-
-    Both triangles of a pixel have its lower left corner as lower left corner.
-    """
+    """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`."""
     side = np.sqrt(mesh.width * mesh.height / count)
     grid = np.maximum(1, np.round(mesh.period / side)).astype(np.int64)
-    column, row = (mesh.points[mesh.triangles].min(axis=1) / mesh.period * grid).astype(np.int64).T
+    column, row = (mesh.points[mesh.triangles[:, 0]] / mesh.period * grid).astype(np.int64).T
     return np.asarray(row * grid[0] + column), np.ones(grid.prod(), np.int64)
 
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, edge_keys, edges, on_sides, twins, void_edges
-from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
+from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, edge_keys, edges, on_sides, twins
+from feti_homog.mesh.periodic_topology import Torus, components
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
-from feti_homog.typing import Bool, Float, Int, Int32
+from feti_homog.typing import Float, Int, Int32
 
 # Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
 MOST_PAIRS = 1000
@@ -174,10 +174,14 @@ def stray_lines(mesh: RawMesh) -> list[str]:
     return _listed(fault, bad, lambda ends: f"that between nodes {ends[0]} and {ends[1]}")
 
 
-def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """List the debonded lines (d, 2) that are not fibre-matrix edges, by the mask `fit` (d,) of fibre-matrix edges."""
+def cannot_debond(mesh: RawMesh, torus: Torus) -> list[str]:
+    """List the debonded lines that are not edges between a fibre and the matrix."""
+    one, other, edge = torus.sides
+    between, pairs = np.zeros(len(torus.edge_keys), bool), torus.mesh.debonded_edges
+    between[edge] = (torus.mesh.phase[one] == 0) != (torus.mesh.phase[other] == 0)
+    fit, n = torus.edges[between[torus.torus_edge]].astype(np.int32), len(torus.mesh.points)
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix: '
-    return _listed(fault, pairs[~fit], mesh.edge)
+    return _listed(fault, pairs[~np.isin(edge_keys(pairs, n), edge_keys(fit, n))], mesh.edge)
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
@@ -222,17 +226,18 @@ def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
     return faults
 
 
-def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
+def islands(raw: RawMesh, torus: Torus) -> list[str]:
     """List floating mesh parts, which share no edge with the largest part."""
-    part = components(len(mesh.triangles), *edge_pairs(Torus.of(mesh).triangle_torus_edges))
+    part = components(len(raw.triangles), *torus.sides[:2])
     loose = np.flatnonzero(part != np.bincount(part).argmax())
     first = loose[np.unique(part[loose], return_index=True)[1]]
     return _listed("floating parts, which voids part from all others: that with ", first, raw.element)
 
 
-def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
+def void_faults(raw: RawMesh, torus: Torus, has_voids: bool) -> list[str]:
     """List unexpected holes, voids without an area, touching voids, and uncovered areas."""
-    pairs, empty = void_edges(mesh), 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
+    mesh, pairs = torus.mesh, torus.low_copies(torus.at_void)
+    empty = 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:
         return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []
     if empty > ROUNDING and not has_voids:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from feti_homog.errors import MeshError, escaped
-from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, can_debond, paired_sides, representatives
+from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
@@ -107,8 +107,9 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
         boundary=boundary,
     )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
-    _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
-    _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
+    torus = Torus.of(mesh)
+    _refuse(path, mesh_checks.islands(raw, torus), mesh_checks.void_faults(raw, torus, has_voids))
+    _refuse(path, mesh_checks.cannot_debond(raw, torus))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     mesh = with_circles(mesh, middles)
     # Fibre numbers are those without bent edges: round fibres first.

@@ -7,13 +7,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import edge_keys, edges
+from feti_homog.mesh.coarse_mesh import HALVES, edge_keys, edges
 from feti_homog.typing import Float, Int, Int32
 
 # The physical curve of edges that are debonded from the start.
 DEBONDED = "debonded"
-# The triangles on either side of the diagonal 02, and on either side of the diagonal 13.
-HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
 # Ratio of the smaller triangles of both diagonals, from which the ratio prevails over alternating diagonals.
 MUCH_LARGER = 2.0
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs, interface_edges
-from feti_homog.mesh.periodic_topology import components
+from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
+from feti_homog.mesh.periodic_topology import Torus, components
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float, Int, Int32
@@ -35,7 +35,8 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
     corner. Middle nodes cut edges in two. Other interfaces stay polygons.
     """
-    pairs = interface_edges(mesh)
+    torus = Torus.of(mesh)
+    pairs = torus.low_copies(torus.is_outline)
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
         # The circle |d|^2 = 2 c.d + r^2 - |c|^2 that fits best, with offsets d from the mean.
@@ -78,7 +79,8 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     of the ellipse parameter, or have a rise of more than MOST_BENT edge lengths. Middle nodes cut edges in two. Other
     interfaces do not change. Edges flip in triangles with two edges on one ellipse.
     """
-    pairs, nodes = interface_edges(mesh), len(mesh.points)
+    torus, nodes = Torus.of(mesh), len(mesh.points)
+    pairs = torus.low_copies(torus.is_outline)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     ellipses, arcs = list[Ellipses](), list[Int32]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
@@ -102,7 +104,8 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     Edges on circles and ellipses do not change, and neither do straight edges, with the middle node within STRAIGHT
     lengths of the chord. Edges flip in triangles with two edges on one curve, which has no corner between the edges.
     """
-    pairs, nodes = interface_edges(mesh), len(mesh.points)
+    torus, nodes = Torus.of(mesh), len(mesh.points)
+    pairs = torus.low_copies(torus.is_outline)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     start, stop, middle = mesh.points[pairs[:, 0]], mesh.points[pairs[:, 1]], middles.between(pairs)
     chord, offset = stop - start, middle - (start + stop) / 2

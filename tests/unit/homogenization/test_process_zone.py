@@ -12,7 +12,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog.analysis.description import describe
 from feti_homog.case import cases
 from feti_homog.homogenization import cell_remarks
-from feti_homog.mesh.coarse_mesh import interface_edges
+from feti_homog.mesh import Torus
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
 # Elem. 35 (2011) 207. k_n = 2025 has the strength 90 MPa and the length 0.77 micrometres.
@@ -27,7 +27,8 @@ DOCUMENT = {
 
 
 def longest_edge(mesh):
-    return cell_remarks.longest(mesh.points[interface_edges(mesh)])
+    torus = Torus.of(mesh)
+    return cell_remarks.longest(mesh.points[torus.low_copies(torus.is_outline)])
 
 
 def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=".", **cell):

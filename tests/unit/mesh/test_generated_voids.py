@@ -14,8 +14,9 @@ from feti_homog import run
 from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh import Torus
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.coarse_mesh import areas, void_edges, voids
+from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 MATRIX = {"young": 3.0, "poisson": 0.35}
@@ -58,9 +59,10 @@ def test_no_voids_leave_a_cell_as_it_is():
 def test_voids_are_holes_whose_edges_lie_on_their_circles():
     mesh = generate(circular(fibres=8, fraction=0.3, voids=0.08, void_radius=0.7, size=0.04, seed=2))
     expected = arrange(circular(fibres=8, fraction=0.3, voids=0.08, void_radius=0.7, seed=2))
-    assert voids(mesh) == len(expected.radii) - 8 > 1 and mesh.phases == ("matrix", "fibre")
+    assert Torus.of(mesh).voids == len(expected.radii) - 8 > 1 and mesh.phases == ("matrix", "fibre")
     assert 1 - areas(mesh.points, mesh.triangles).sum() == pytest.approx(0.08, rel=0.06)
-    ends = mesh.points[void_edges(mesh)].reshape(-1, 2)
+    torus = Torus.of(mesh)
+    ends = mesh.points[torus.low_copies(torus.at_void)].reshape(-1, 2)
     away = (ends[:, None] - expected.centres[8:] + 0.5) % 1.0 - 0.5
     assert np.abs(np.linalg.norm(away, axis=2) - expected.radii[8:]).min(axis=1).max() < 1e-12
     assert np.unique(mesh.triangles).tolist() == list(range(len(mesh.points)))
@@ -70,13 +72,13 @@ def test_fibres_of_a_table_are_numbered_as_if_there_were_no_voids(tmp_path):
     found = arrange(case_of(tmp_path, table(ROWS)).cell)
     assert found.phase == ("fibre", "void", "void") and found.radii == pytest.approx([0.2, 0.15, 0.1])
     mesh = generate(case_of(tmp_path, table(ROWS)).cell)
-    assert sorted(set(mesh.precedence.tolist())) == [0, 1] and voids(mesh) == 2
+    assert sorted(set(mesh.precedence.tolist())) == [0, 1] and Torus.of(mesh).voids == 2
 
 
 def test_a_cell_of_voids_alone(tmp_path):
     only = [row for row in ROWS if row.get("phase")]
     mesh = generate(case_of(tmp_path, table(only), "matrix").cell)
-    assert mesh.phases == ("matrix",) and voids(mesh) == 2
+    assert mesh.phases == ("matrix",) and Torus.of(mesh).voids == 2
 
 
 @pytest.mark.parametrize("cell", [RANDOM | {"voids": 0.05}, table(ROWS)], ids=["random", "table"])
@@ -86,7 +88,7 @@ def test_the_table_of_a_cell_with_voids_gives_it_again(tmp_path, cell):
     (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
     again = {"geometry": "table", "file": "again.csv", "mesh_size": case.cell.mesh_size}
     one, other = (generate(each) for each in (case.cell, case_of(tmp_path, again).cell))
-    assert voids(one) == voids(other) > 0
+    assert Torus.of(one).voids == Torus.of(other).voids > 0
     if cell["geometry"] == "random":
         assert np.abs(one.points - other.points).max() < 1e-12 and np.array_equal(one.triangles, other.triangles)
     pattern = fibre_statistics.pattern(tmp_path / "case.toml", None) if cell["geometry"] == "random" else None

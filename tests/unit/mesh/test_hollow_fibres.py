@@ -10,7 +10,7 @@ from support.generated_meshes import generate
 from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
-from feti_homog.mesh.coarse_mesh import areas, voids
+from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 
@@ -32,7 +32,7 @@ def case_of(*rows, coated=False, **cell):
 @pytest.mark.parametrize("more", [(), (OVAL,)], ids=["circles", "ellipses"])
 def test_a_hollow_fibre_is_a_ring_around_a_void(more):
     mesh = generate(case_of(COATED, TUBE, VOID, *more, coated=True).cell)
-    assert voids(mesh) == 2 and mesh.phases == ("matrix", "fibre", "coating")
+    assert Torus.of(mesh).voids == 2 and mesh.phases == ("matrix", "fibre", "coating")
     found = areas(mesh.points, mesh.triangles)
     own = (mesh.precedence == 2) & (mesh.phase == 1)
     assert found[own].sum() == pytest.approx(np.pi * (0.2**2 - 0.12**2), rel=0.02)
@@ -54,7 +54,7 @@ def test_the_table_of_hollow_fibres_gives_the_cell_again(tmp_path, more):
     for phase in range(3):
         one, other = (areas(m.points, m.triangles)[m.phase == phase].sum() for m in (mesh, again))
         assert one == pytest.approx(other, rel=1e-3)
-    assert voids(again) == 2
+    assert Torus.of(again).voids == 2
 
 
 @pytest.mark.parametrize(("row", "words"), [

@@ -15,7 +15,7 @@ from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.coarse_mesh import areas, voids
+from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.outline.graded_size import MeshSizes
 from feti_homog.mesh.periodic_topology import Torus
@@ -91,7 +91,7 @@ def test_polygons_circles_and_ellipses_are_meshed_together():
     case = case_of(*ROWS)
     mesh, arrangement = generate(case.cell), arrange(case.cell)
     found = areas(mesh.points, mesh.triangles)
-    assert mesh.phases == ("matrix", "coating", "fibre") and voids(mesh) == 1
+    assert mesh.phases == ("matrix", "coating", "fibre") and Torus.of(mesh).voids == 1
     assert sorted(set(mesh.precedence.tolist())) == [0, 1, 2, 3, 5]
     for number, radius in enumerate(arrangement.radii[:3], 1):
         assert found[mesh.precedence == number].sum() == pytest.approx(np.pi * radius**2, rel=0.01)
@@ -129,7 +129,7 @@ def test_the_table_of_polygons_gives_the_cell_again(tmp_path):
     document["cell"] = {"geometry": "table", "file": "again.csv", "mesh_size": 0.06}
     mesh, again = generate(case.cell), generate(cases.parse(document, tmp_path).cell)
     sums = [[areas(m.points, m.triangles)[m.phase == phase].sum() for phase in range(3)] for m in (mesh, again)]
-    assert sums[0] == pytest.approx(sums[1], rel=1e-3) and voids(again) == 1
+    assert sums[0] == pytest.approx(sums[1], rel=1e-3) and Torus.of(again).voids == 1
     run(case, MPI.COMM_SELF, out=tmp_path / "run")
     assert listed_fibres.table(tmp_path / "run") == (tmp_path / "again.csv").read_text()
 
@@ -172,7 +172,7 @@ def test_corners_of_cells_are_in_no_void(radius, place):
     assert np.linalg.norm((void + 0.5) % 1.0 - 0.5, axis=1) > radius
     mesh = mesh_outlines(arrangement, MeshSizes(0.05, 0.05, 0.05), 1.0)
     assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(1.0 - np.pi * radius**2, rel=5e-3)
-    assert voids(mesh) == 1
+    assert Torus.of(mesh).voids == 1
 
 
 def test_a_cut_window_moves_polygons():

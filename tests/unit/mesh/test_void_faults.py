@@ -7,7 +7,7 @@ from support.void_cells import write_part, write_voids
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.mesh.coarse_mesh import voids
+from feti_homog.mesh import Torus
 from feti_homog.mesh.readers.msh_reader import read
 
 
@@ -42,7 +42,7 @@ def test_a_hole_is_a_fault_unless_the_case_has_voids(tmp_path):
     assert fault.startswith("cell.msh: holes, 39 % of the cell, the first beside the edge between node ")
     unsaved = "gmsh saves no surface outside physical groups"
     assert fault.endswith(f": expected elements there ({unsaved}), or voids = true in [cell] if holes are voids")
-    assert voids(read(tmp_path / "cell.msh", has_voids=True)) == 1
+    assert Torus.of(read(tmp_path / "cell.msh", has_voids=True)).voids == 1
 
 
 def test_a_part_that_a_void_surrounds_is_held_by_nothing(mesh, tmp_path):

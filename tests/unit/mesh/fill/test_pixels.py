@@ -11,8 +11,10 @@ from support.pixel_images import quadrilaterals, random_image
 
 from feti_homog import Case, run
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh import Torus
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill import pixel_mesher
+from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_classes
 from feti_homog.microstructure import label_image
 
 MATERIALS = {
@@ -213,7 +215,7 @@ def test_meshes_leave_voids_open(tmp_path, cell):
     image = np.zeros((6, 7), int)
     image[2, 2], image[5, 3:5], image[0, 4], image[0, 0] = 1, 2, 2, 2
     mesh, copies = with_voids(tmp_path, image, pixel=0.5, **cell), 4 if "window" in cell else 1
-    assert mesh.phases == ("matrix", "fibre") and len(mesh.triangles) == 2 * 38 * copies
+    assert mesh.phases == ("matrix", "fibre") and len(mesh.triangles) == 38 * copies
     assert areas(mesh.points, mesh.triangles) == pytest.approx(0.125) and mesh.period.prod() == 10.5 * copies
     assert np.array_equal(np.unique(mesh.triangles), np.arange(len(mesh.points)))
     period = mesh.period if "boundary" not in cell else np.full(2, np.inf)
@@ -221,6 +223,31 @@ def test_meshes_leave_voids_open(tmp_path, cell):
     assert (np.isin(offset, [0.0, *period])).all()
     keys = {tuple(point) for point in np.mod(mesh.points, period).tolist()}
     assert len(keys) == len(np.unique(mesh.representative))
+
+
+@pytest.mark.parametrize("cell", [{}, {"boundary": "displacement"}])
+def test_halves_of_pixels_share_diagonals_between_even_nodes(tmp_path, cell):
+    image = random_image(8, 5, phases=2)
+    image[2, 2:4], image[7, 6] = 2, 2
+    torus = Torus.of(with_voids(tmp_path, image, pixel=0.5, **cell))
+    subdomain = np.random.default_rng(1).integers(0, 3, len(torus.constituent))
+    table = SubdomainTable.of(torus, subdomain, np.zeros(3, np.int64), across=True)
+    (own,) = cut_for_ranks(torus, subdomain, table, 1, pinned_classes(torus))
+    found = []
+    for number, submesh in enumerate(own.cut()):
+        triangles, ends = submesh.triangles, submesh.edges[submesh.triangle_edges]
+        sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
+        forwards = np.where(submesh.backwards[..., None], sides[..., ::-1], sides)
+        assert np.array_equal(ends, forwards) and areas(submesh.points, triangles) == pytest.approx(0.125)
+        assert np.array_equal(submesh.constituent[::2], torus.constituent[subdomain == number])
+        assert (np.diff(submesh.edge_keys) > 0).all() and len(submesh.at_void) == len(submesh.edge_keys)
+        lower, upper = submesh.points[submesh.edges].transpose(1, 0, 2)
+        assert ((lower[:, 0] < upper[:, 0]) | ((lower[:, 0] == upper[:, 0]) & (lower[:, 1] < upper[:, 1]))).all()
+        diagonal = (lower != upper).all(axis=1)
+        assert not ((lower[diagonal] / 0.5).sum(axis=1) % 2).any() and diagonal.sum() == len(triangles) // 2
+        found.append(submesh.edge_keys[submesh.edge_class[diagonal]])
+    assert len(np.unique(np.concatenate(found))) == len(subdomain)
+    assert min(map(min, found)) > max(torus.edge_keys)
 
 
 def test_voids_part_nothing_and_leave_sides_to_tractions(tmp_path):
