@@ -195,7 +195,7 @@ class NodeBlocks:
             self.blocks.append((starts[chosen][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """Invert the block of rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
+        """Invert the blocks on rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

@@ -36,7 +36,7 @@ class ExplicitInterfaceOperator:
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
         """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), which are ascending.
 
-        Options have the prefix `feti_schur_`.  `keep_factor` keeps the factor, if CHOLMOD condenses loads inside.
+        Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
