@@ -44,8 +44,8 @@ class _Fibres:
     Attributes:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
-        reach: (motions,) largest gap or slip of each motion at any node: open nodes may lie within one rigid group.
-        fibre: (k,) number of the fibre; a fibre counts with its coating, and neighbouring layers count together.
+        reach: (motions,) largest gap or slip of each motion at any node, open or not.
+        fibre: (k,) number of the fibre; a fibre and its coating, and neighbouring layers, have one number.
     """
 
     is_open: Bool

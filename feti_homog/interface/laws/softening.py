@@ -100,8 +100,8 @@ class CohesiveLaw(SpringLaw):
             if teeth or excess <= tolerance:
                 return tuple(levels.tolist())
         raise CaseError(
-            f"[interface] softening_tolerance = {tolerance:g}: with {MOST_TEETH} teeth, the most, the first exceeds "
-            f"the peak traction by {excess:.1e} of it; expected at least that"
+            f"[interface] softening_tolerance = {tolerance:g}: even with {MOST_TEETH} teeth, the first tooth exceeds "
+            f"the peak traction by the fraction {excess:.1e}; expected at least this fraction"
         )
 
     @property

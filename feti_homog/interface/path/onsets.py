@@ -22,7 +22,7 @@ from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.typing import Bool, Float, Int
 
-# Parts of a straight way at whose ends a utilisation without convexity is evaluated.
+# Number of parts of a step at whose ends a utilisation that is not convex is evaluated.
 PARTS = 32
 
 
