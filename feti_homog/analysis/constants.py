@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Named = Mapping[str, Float]
 PARTS = ("absolute", "signed", "least")
-OFF = 3.0  # largest ratio of the true energy error to the estimated one
+OFF = 3.0  # largest ratio of the true energy error to the estimate
 
 
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
@@ -174,7 +174,7 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
     finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
     line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
     context.notes.append(
-        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
+        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} would be fine enough"
     )
 
 
@@ -204,7 +204,7 @@ def note_outside(
 ) -> None:
     """Note each value outside its limits; record a fault beyond any mesh error, as `_note_bounds`.
 
-    Limits are of effective constants: those of a cell that is not periodic may lie outside.
+    The limits bound effective constants; constants of a cell that is not periodic may lie outside.
     """
     if context.case.cell.boundary != "periodic":
         return

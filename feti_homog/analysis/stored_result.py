@@ -25,7 +25,7 @@ def read(directory: Path) -> dict[str, Any]:
         size = len(voigt.plane_state_of(document).components)
         points = result.path or ()
         if not all(0.0 < p.load_factor <= 1.0 and len(p.strain) == len(p.stress) == size for p in points):
-            raise CaseError(f"{directory / checkpoints.FOLDER}: it is damaged: its points are not of its case")
+            raise CaseError(f"{directory / checkpoints.FOLDER}: it is damaged: its points do not fit its case")
     elif result.case["output"].get("fields", True):
         _check_fields(directory, result)
     return document
