@@ -26,7 +26,7 @@ SETTINGS = {
 }
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
-# Bytes: a stack for MPI, which does not start with a quarter of it; addresses for a small run on one rank.
+# Bytes of stack for MPI, which does not start with a quarter of them; bytes of addresses for a small run on one rank.
 STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
