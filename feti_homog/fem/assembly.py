@@ -1,7 +1,7 @@
 """Assembly in one subdomain: stiffness, unit strain loads, averages, integrals along voids.
 
-Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are summed
-first, to one `MacroElement`; all affine coarse triangles have the same reference integrals.
+Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
+summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
 from __future__ import annotations
