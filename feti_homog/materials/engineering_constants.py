@@ -1,7 +1,7 @@
 """Compute the named constants of a stiffness, and describe their symbols and axes.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
-fibres, with engineering shears, in any stress unit.  Expansions (6,), strains per unit of temperature, are likewise.
+fibres, with engineering shears, in any stress unit.  Expansions (6,) are strains per unit of temperature.
 
 Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Axes 1, 2, 3 of a ply, of data sheets and
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
@@ -22,7 +22,7 @@ from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # number of directions across the fibres
 
-# Factors by which the components of a stiffness, (3, 3) or (6, 6), get the Frobenius norm of the tensor.
+# Factors for the components of a stiffness, (3, 3) or (6, 6), that make their norm the Frobenius norm of the tensor.
 _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (6, [1, 1, 1, 2, 2, 2]))}
 
 
@@ -73,7 +73,7 @@ class TransverseIsotropy:
     G_transverse: float = described("shear modulus across the fibres", records.STRESS)
     K_transverse: float = described("bulk modulus across the fibres in plane strain", records.STRESS)
     expansion_axial: float | None = described("expansion along the fibres; null if a phase gives none", PER_TEMPERATURE)
-    expansion_transverse: float | None = described("expansion across the fibres; null likewise", PER_TEMPERATURE)
+    expansion_transverse: float | None = described("expansion across the fibres; or null, too", PER_TEMPERATURE)
     deviation: float = described(
         "relative distance of the stiffness, as a fourth-order tensor, to the nearest transversely isotropic one"
     )
@@ -84,9 +84,9 @@ class TransverseModuli:
     """Range of moduli across the fibres, over 720 directions in half a turn about x3."""
 
     E_least: float = described("least Young's modulus across the fibres", records.STRESS)
-    E_largest: float = described("the largest one", records.STRESS)
+    E_largest: float = described("largest Young's modulus across the fibres", records.STRESS)
     G_least: float = described("least shear modulus in the plane across the fibres", records.STRESS)
-    G_largest: float = described("the largest one", records.STRESS)
+    G_largest: float = described("largest shear modulus in the plane across the fibres", records.STRESS)
 
 
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
