@@ -20,8 +20,8 @@ class DualSolution:
     """The solution of the dual problem, Eqs. (36) and (37), under one load.
 
     Attributes:
-        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem; with tractions on the
-            sides (v + m,), with their Sigma at the end.
+        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem; (v + m,) for tractions
+            on the sides, whose Sigma comes last.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.

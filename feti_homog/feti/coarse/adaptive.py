@@ -86,7 +86,7 @@ class AdaptiveCoarseSpace:
     def activate(self, active: Float) -> None:
         """Average the modes over node copies on active rows, and factor again.  Collective.
 
-        Rows are active where `active` (owned rows,) is 1, and must be the same in the scaling.  Raises as `factor`.
+        Rows are active where `active` (owned rows,) is 1; the scaling has the same active rows.  Raises as `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
@@ -114,7 +114,7 @@ class AdaptiveCoarseSpace:
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
         have no energy and get no equation; other modes may be linearly dependent.  Adding eps I makes the matrix
-        definite; S_0 then keeps the part eps / (mu + eps) of forces of coarse displacements with scaled energy mu.
+        definite; from forces of a coarse displacement with scaled energy mu, S_0 then keeps eps / (mu + eps).
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.

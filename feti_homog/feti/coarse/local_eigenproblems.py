@@ -35,7 +35,7 @@ class SubdomainBlocks:
     Attributes:
         subdomain: the subdomain.
         dofs: (n,) boundary degrees of freedom.
-        operator: boundary operators.
+        operator: S and S+ of the subdomain with its springs.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
         facewise: whether every face has a separate eigenproblem.

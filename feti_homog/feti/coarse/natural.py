@@ -143,7 +143,7 @@ class GramMatrix:
     """The matrix G^T A G for active rows A = diag(a) that change, summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Multiply all pairs of entries in a row of G, and group the `movable` modes.  Collective."""
+        """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.

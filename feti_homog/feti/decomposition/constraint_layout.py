@@ -175,7 +175,7 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """Count the node copies in both bodies of every row, and return the inner body.
+        """Count the node copies in the outer and the inner body of every row.
 
         Returns:
             (local rows, 2) copies in the outer and the inner body, and (local rows,) number of the inner body; rows
@@ -210,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """List entity and position p on it for every fine node; `nodes` (e,) are counts."""
+    """List the entity of every fine node, and its position p there; `nodes` (e,) are counts."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

@@ -144,8 +144,8 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     """Assign subdomains with `load` (s,) triangles to ranks: (s,).
 
-    METIS keeps neighbours (left, right), one pair for every shared edge, on the same rank; if this makes the largest
-    load more than MAX_IMBALANCE times as large, loads are balanced alone.  Ranks beyond the subdomains stay empty.
+    METIS keeps neighbours (left, right), one pair for every shared edge, on the same rank.  If its largest load exceeds
+    the largest balanced load by MAX_IMBALANCE, only loads decide.  Ranks stay empty if subdomains are too few.
     """
     by_load = distributed_arrays.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

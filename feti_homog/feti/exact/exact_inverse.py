@@ -173,7 +173,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return the `rows` without columns, and active rows without columns beside them.  Collective.
+        """Return the `rows` without columns, and neighbouring active rows without columns.  Collective.
 
         Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
         """
@@ -183,7 +183,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def _are_active(self) -> Bool:
-        """Return whether rows are active (all rows,).  Collective."""
+        """Return whether each row of the cell is active: (all rows,).  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
@@ -227,7 +227,7 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
+        """Compute the answer U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
         `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
         updates, and replaces the stored U.

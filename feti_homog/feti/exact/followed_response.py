@@ -159,7 +159,7 @@ class FollowedResponse:
         return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update for springs of active rows (k,) that gain compliance `more` (k,); False as `follow`.  Collective."""
+        """Update U and columns for springs (k,) that gain compliance `more` (k,); as `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -172,7 +172,7 @@ class FollowedResponse:
         return B is not None
 
     def _turn(self, rows: Int, sign: Float, gain: Float, pivot: float) -> bool:
-        """Update for rows that become inactive (sign 1) or active (-1); False as `follow`.  Collective.
+        """Update U and columns for rows that become inactive (sign 1) or active (-1); as `follow`.  Collective.
 
         Pins on which a new active row exerts a force become inactive.
         """
