@@ -61,7 +61,7 @@ class ContactProblem:
         return self.solver.jump_operator.nodes
 
     def active(self, status: Status) -> Float:
-        """Mark the active multipliers (owned rows,) by 1.
+        """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
         All multipliers at bonded nodes, and normal forces at closed nodes, are active.
         """

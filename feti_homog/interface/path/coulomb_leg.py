@@ -48,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Settle at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
+        """Find the state at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)

@@ -80,8 +80,8 @@ class Onset:
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
     """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
-    the bisection takes the first part of the step that ends with a utilisation above 1.
+    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once, where bisection finds it.
+    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
