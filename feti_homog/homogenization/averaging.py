@@ -68,7 +68,7 @@ class Response:
 
     @property
     def all_loads(self) -> Float:
-        """The loads of the response, `DualSolution.strain`."""
+        """The loads of the response: all entries of `DualSolution.strain`, scaled."""
         return self.scale * self.state.solution.strain
 
     @property

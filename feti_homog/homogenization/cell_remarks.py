@@ -22,7 +22,7 @@ LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """Return the interface number (phases, phases) between two phases.
+    """Return the interface number (phases, phases) of each pair of phases.
 
     The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
     matrix, the first phase, and all other phases.
