@@ -100,7 +100,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 
 
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
-    """Return a radius for each fibre phase; None if closed estimates do not apply (on springs, radii must be equal)."""
+    """Return a radius for each fibre phase; None if closed forms do not apply (springs need equal radii)."""
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
     is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)
@@ -183,8 +183,8 @@ def _note_bounds(
 ) -> None:
     """Note constants outside their bounds; record faults beyond any mesh error.
 
-    No relative error of a constant exceeds `energy`, the largest relative error of the strain energy; the true error
-    is at most OFF times the estimate.  A bound applies to a cell with its symmetry.
+    The relative error of a constant is at most `energy`, the largest relative error of the strain energy; true errors
+    are at most OFF times the estimates.  A bound applies only if the cell has the symmetry that the bound assumes.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")

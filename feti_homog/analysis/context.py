@@ -205,7 +205,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the entries of a point: debonding under the last plane strain, iterations.  Collective."""
+        """Return a path point's entries: debonding under the last plane strain, and iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -234,7 +234,7 @@ class Result:
     def __getattr__(self, name: str) -> Any:
         """Return a number of a record of CONSTANTS by its name, such as E1, nu12, G12 or E_axial.
 
-        Raises AttributeError, with the record that has the name, or with near names.
+        Raises AttributeError, which names the record with this attribute, or similar names.
         """
         parts = {key: vars(part) for key, part in vars(self).items() if is_dataclass(part)}
         table = {key: value for record in CONSTANTS for key, value in parts.get(record, {}).items()}
@@ -263,7 +263,7 @@ RECORDS = (*filter(is_dataclass, (*vars(cell_records).values(), *vars(result_rec
 
 
 def _times(value: Any, s: float, power: int = 0) -> Any:
-    """Multiply the numbers in a value by s to the power of their entry."""
+    """Multiply the numbers in a value by s^k, with the power k of their entry in POWERS."""
     if isinstance(value, Mapping):
         return {name: _times(item, s, POWERS.get(name, power)) for name, item in value.items()}
     if isinstance(value, list | tuple):

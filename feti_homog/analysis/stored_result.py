@@ -47,7 +47,7 @@ def check_to_draw(directory: Path) -> str:
 
 
 def finished(directory: Path, case: Case, ranks: int) -> bool:
-    """Return whether a folder without checkpoint has a case's whole result.  Call on one rank.
+    """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged or belongs to another case, the checkpoint also to another number of ranks.
