@@ -99,7 +99,7 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Return the fault of a module that cannot be imported; errors about NumPy mean another release."""
+    """Return the fault of a module that cannot be imported; an error about NumPy means a build for another one."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np

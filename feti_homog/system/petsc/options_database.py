@@ -16,7 +16,7 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Insert the options of a case below the options of the command line, for the block.
+    """Set the options of a case for the block; options of the command line take precedence.
 
     PETSc's flags cannot be false: false flags are removed for the block.
 
