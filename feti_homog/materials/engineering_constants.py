@@ -122,7 +122,7 @@ def _along_axes(S: Array) -> dict[str, Any]:
 def about_fibres(C: Array) -> dict[str, Any]:
     """Tabulate the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
 
-    Nearest in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3, in Hill's moduli
+    The nearest one in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3: Hill's moduli
 
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
@@ -169,7 +169,7 @@ def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:
-    """Return the isotropic stiffness C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
+    """Return the isotropic stiffness (3, 3): C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
     plus, minus = bulk + shear, bulk - shear
     return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
 
@@ -289,7 +289,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names, such as `S12`, with another meaning in a ply; '' without such names."""
+    """Describe the axes of names that mean something else in a ply, such as `S12`; '' without such names."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

@@ -127,7 +127,7 @@ def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Put every fibre by itself into the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
+    """Estimate the constants by `cylinders_in_matrix`: every fibre alone in the matrix, under its mean field.
 
     The method allows any kinds of round fibres, also on springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
     isotropic phases: Chen, Dvorak and Benveniste 1992; springs: Benveniste 1985.
@@ -136,11 +136,11 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Fill space with similar cylinders of fibre and matrix, for one kind of fibres, also on springs.
+    """Estimate the constants of similar cylinders that fill space, for one kind of fibres, also on springs.
 
-    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; shear across the
-    fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin 1979; expansions: Rosen and Hashin 1970;
-    springs on fibres of equal radius: Hashin 1990.
+    Each cylinder is a fibre in matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and the expansions are exact for
+    this arrangement; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin
+    1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -149,7 +149,7 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate after Christensen and Lo, for one kind of fibres, also on springs.
+    """Estimate the constants after Christensen and Lo, for one kind of fibres, also on springs.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
     E_T and nu_T follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.

@@ -223,7 +223,7 @@ def aligned_cylinders(
 
 
 def expansions(phase: TransverseIsotropy) -> Pair | None:
-    """Return the axial and transverse expansions, if the phase has both."""
+    """Return the axial and transverse expansions; None unless the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse
