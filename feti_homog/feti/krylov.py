@@ -164,7 +164,7 @@ class Krylov:
         self.ksp.setComputeSingularValues(permitted <= max(MAX_ITERATIONS, sizes[1]))
 
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
-        """Solve P F lam = `right` (rows, k), projected jumps, starting from `lam` (rows, k).  Collective.
+        """Solve P F lam = `right` for projected jumps `right` (rows, k), starting from `lam` (rows, k).  Collective.
 
         With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
         so that only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their

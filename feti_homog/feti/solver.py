@@ -177,7 +177,7 @@ class FetiSolver:
 
     @property
     def is_pulled(self) -> bool:
-        """Return whether tractions are given on the sides, which push subdomains."""
+        """Return whether tractions are given on the sides, and subdomains have rigid motions."""
         return self.natural.kernel_dimension > 0 and self.condensed.boundary.shape[1] > len(self.problem.loads)
 
     @property

@@ -97,7 +97,7 @@ class NaturalCoarseSpace:
     def _gram(self) -> GramMatrix:
         """Return the matrix G^T A G; it stores 36 products per row.  The first call is collective.
 
-        Modes of the pinned body are left out: its pieces are glued to the pinned class and cannot move.
+        Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 

@@ -68,7 +68,7 @@ def halves(torus: Torus) -> Partition | None:
 def blocks(mesh: CoarseMesh, count: int) -> tuple[Int, Int]:
     """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`.
 
-    The least x and the least y of a triangle decide on its block; they are the same for both triangles of a pixel.
+    The least x and the least y of a triangle select its block; both triangles of a pixel have the same ones.
     """
     side = np.sqrt(mesh.width * mesh.height / count)
     grid = np.maximum(1, np.round(mesh.period / side)).astype(np.int64)

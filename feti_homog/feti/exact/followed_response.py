@@ -159,7 +159,7 @@ class FollowedResponse:
         return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns for springs (k,) that gain compliance `more` (k,); as `follow`.  Collective."""
+        """Update U and columns for springs (k,) that gain compliance `more` (k,); return as `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -172,9 +172,9 @@ class FollowedResponse:
         return B is not None
 
     def _turn(self, rows: Int, sign: Float, gain: Float, pivot: float) -> bool:
-        """Update U and columns for rows that become inactive (sign 1) or active (-1); as `follow`.  Collective.
+        """Update U and columns for rows that become inactive (sign 1) or active (-1).  Collective.
 
-        Pins on which a new active row exerts a force become inactive.
+        Arguments and result are as in `follow`.  Pins on which a new active row exerts a force become inactive.
         """
         columns, values = self._present(rows)
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B (Gamma_I:, U_I) from U at once, from the columns later; `values` as `_present`."""
+        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `values` as from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B

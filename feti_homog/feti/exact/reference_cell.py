@@ -41,8 +41,8 @@ class AssembledSchur:
     def __init__(self, operators: InterfaceOperators, active: Float) -> None:
         """Assemble and factor Z^T S Z.  Collective.
 
-        Rows with `active` (owned rows,) 1 must leave no rigid-body motion free.  LAPACK factors dense matrices; options
-        for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+        Rows where `active` (owned rows,) is 1 must leave no rigid-body motion free.  LAPACK factors dense matrices;
+        options for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
 
         Raises:
             TypeError: a boundary operator is not dense.

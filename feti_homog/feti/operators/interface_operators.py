@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node belongs to a single other body.
-        has_springs: whether it is an inner body with springs: then its stiffness with springs is a dense matrix.
+        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ is then dense.
     """
 
     dofs: int
@@ -58,9 +58,9 @@ def choose(
     Returns two flags for every subdomain: `explicit`, dense matrices instead of sparse factors, and `facewise`, soft
     modes computed face by face.
 
-    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs` and either their inverse takes no longer
-    than all products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), or it has springs, or its soft
-    modes need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
+    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs`, and if their inverse takes no longer than
+    all products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), or it has springs, or soft modes
+    need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
 
     Args:
         sizes: sizes of the subdomains; the result has the same order.
