@@ -62,8 +62,8 @@ class Macroscopic:
     def released_to(self, after: Macroscopic) -> float:
         """Return the energy that a break releases at constant load.
 
-        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), with ' after the break; at constant strain
-        1/2 E.(Sigma - Sigma').
+        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state after the break;
+        at constant strain it is 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
 

@@ -118,8 +118,8 @@ class FloatingBodies:
         """Move the free fibres until no open node overlaps by more than noise.  Collective, decided on rank 0.
 
         A fibre that overlaps moves to the position with the largest minimum gap.  If even this gap overlaps, the dual
-        solution of the programme is a system of contact forces in balance: the nodes of these forces squeeze the fibre,
-        and have to close.
+        solution of the linear programme is a system of contact forces in balance: the nodes of these forces squeeze
+        the fibre, and have to close.
 
         Returns:
             Amplitudes (dimension,) to add to alpha, and (k,) open nodes that squeeze a fibre.

@@ -113,7 +113,7 @@ class CondensedProblem:
 class AxialFaces:
     """The part of the matrix S of `coulomb_faces` for the axial problem, with eliminated jumps: g = K^-1 b E.
 
-    A weak spring, HELD times the row's own diagonal entry of K, holds each row: other entries may be far larger.
+    A weak spring holds each row: HELD times the row's own diagonal entry of K, as others may be far larger.
 
     Attributes:
         problem: condensed axial problem.

@@ -89,7 +89,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.
@@ -118,7 +118,7 @@ class CoulombLeg(Leg):
         """Advance along the rates up to and past the next change.
 
         Raises:
-            NotCarriedError: nothing carries more, after a point at the largest load.
+            NotCarriedError: the cell carries no more load; the last point is at the largest load.
             StuckError: no statuses continue the state, or statuses change without end.
         """
         sliding, faces, start = self.sliding, self.sliding.faces, self._share
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the leg fraction that the cell carries, and the error that limits this fraction or None."""
+            """Return the leg fraction that the cell carries, and the error that limits this fraction, or None."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

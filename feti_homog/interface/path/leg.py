@@ -50,7 +50,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:

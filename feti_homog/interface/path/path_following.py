@@ -63,7 +63,7 @@ def increments(
     at the largest load that the cell carries.
 
     Raises:
-        NotCarriedError: nothing carries more, or a step has no admissible statuses.
+        NotCarriedError: the cell carries no more load, or a step has no admissible statuses.
     """
     legs, current = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):
