@@ -60,7 +60,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """The interface nodes (k,) on rank 0 before refinement: fibre from 1, interface number, direction in degrees."""
+    """The interface nodes (k,) on rank 0 before refinement: fibre number from 1, interface, direction in degrees."""
 
     fibre: Int
     pair: Int
