@@ -232,7 +232,7 @@ class Result:
         return replace(Result.of(document), states=None, result_h5=None)
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number of a record of CONSTANTS by its name, such as E1, nu12, G12 or E_axial.
+        """Return a number by its name in a record of CONSTANTS, such as E1, nu12, G12 or E_axial.
 
         Raises AttributeError, which names the record with this attribute, or similar names.
         """

@@ -114,9 +114,9 @@ def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, fl
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
 ) -> list[list[averaging.Response]]:
-    """Return unit load responses with the faces fixed as in one state.  Collective.
+    """Return the responses to unit loads with faces fixed as in the state `name`.  Collective.
 
-    `states` are the responses of the state `name`; the result has a list for each of the `problems`, by number.
+    `states` are the responses of this state.  The result is a list of responses for each number in `problems`.
     """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):
