@@ -189,9 +189,9 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress on a path up to its deepest fall.
+    """The largest stress on a path before the deepest fall of the stress.
 
-    The component belongs to the largest strain that the loads change up to the end of the leg with the first break.
+    The stress component is conjugate to the largest strain that changes up to the end of the leg with the first break.
     """
 
     stress_name: str = described("name of the component")
