@@ -1,7 +1,7 @@
-"""The process: settings of its environment, limits before libraries are loaded, its memory, imports of Matplotlib.
+"""Prepare and measure the process: environment, limits of the system, memory, import of Matplotlib.
 
-Settings precede the imports of NumPy, h5py and MPI.  Under too low limits the program would hang or crash without a
-message.
+The environment is set before NumPy, h5py and MPI are imported.  With too low limits, the program would hang or crash
+without a message.
 """
 
 import ctypes
