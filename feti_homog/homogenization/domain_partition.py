@@ -125,7 +125,7 @@ def distribute(
 ) -> list[RankShare]:
     """Cut the cell, and deal the subdomains to the ranks.
 
-    Raises CaseError if an arc lies on a fibre that cannot have it, or selects no node.
+    Raises CaseError if an arc lies on a fibre that cannot have arcs, or selects no node.
     """
     torus = Torus.of(mesh)
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
