@@ -162,7 +162,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct the preconditioner `name`, as in `SolverPlan`.  Collective.
+    """Construct the preconditioner that `name` selects, as in `SolverPlan`.  Collective.
 
     The modules of `feti.exact` are imported only where a preconditioner needs them.
     """

@@ -27,7 +27,7 @@ def events(
 ) -> Iterator[Point]:
     """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with the strains or stresses of the state before, whichever its waypoint prescribes.  The state of a
+    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a
     point precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with
     `broke` = 0: between points the response is straight.  A point without convergence is the last one.
 
