@@ -29,16 +29,16 @@ class CellInfo:
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, once for each body in each subdomain: depends on ranks")
     mesh_size: float | None = described(
-        "size of the elements before refinement / width, from the case or as `accuracy` chooses; absent of users' "
-        "meshes",
+        "size of the elements before refinement / width, from the case or chosen by `accuracy`; absent for a user's "
+        "mesh",
         default=None,
     )
-    refine: int = described("how many times elements were split in four, likewise", default=0)
+    refine: int = described("how many times elements were split in four, from the case or by `accuracy`", default=0)
     porosity: float = described("share of voids in the area of the cell", default=0.0)
     origin: tuple[float, float] = described("lower left corner of the cell", records.LENGTH, default=(0.0, 0.0))
     match_distance: float | None = described(
-        "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
-        "nearest and second neighbours",
+        "for a cell that matches a table: root mean square difference of the sorted distances of nearest and second "
+        "neighbours, in mean diameters",
         default=None,
     )
 
@@ -48,20 +48,20 @@ class FibreInfo:
     """One fibre, with the number N of `fibre = N` in case files."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
-    row: int | None = described("its line in the table, or place in `fibre_list`, from 1", default=None)
+    row: int | None = described("line in the fibre table, or position in `fibre_list`, from 1", default=None)
     phase: str = described("name of its phase")
     centre: Float | None = described(
-        "that of its circle, in a table where it is listed, else of its area; absent if it winds around the cell",
+        "centre of its circle or area, at the periodic image that a table lists; absent if it winds around the cell",
         records.LENGTH,
         "(2,)",
         default=None,
     )
     radius: float | None = described("radius of its circle; absent if it is not round", records.LENGTH, default=None)
-    semi_axes: Float | None = described("of an ellipse; absent of other shapes", records.LENGTH, "(2,)", default=None)
-    angle: float | None = described("from x1 to the first semi-axis of an ellipse", records.DEGREES, default=None)
-    coating: float | None = described("thickness of its coating; absent without one", records.LENGTH, default=None)
+    semi_axes: Float | None = described("semi-axes, only of an ellipse", records.LENGTH, "(2,)", default=None)
+    angle: float | None = described("angle from x1 to the first semi-axis of an ellipse", records.DEGREES, default=None)
+    coating: float | None = described("thickness of its coating, if any", records.LENGTH, default=None)
     strength: float | None = described(
-        "strength of its bonds / that of [interface]; absent where all fibres have the same", default=None
+        "strength of its bonds / strength in [interface]; absent if all fibres have the same strength", default=None
     )
 
     @classmethod
@@ -105,11 +105,11 @@ class SolverInfo:
     """Sizes, iterations and convergence of the dual problem."""
 
     ranks: int = described("MPI ranks")
-    bodies: int = described("bodies, the matrix and the fibres")
+    bodies: int = described("number of bodies: the matrix and the fibres")
     subdomains: int = described("subdomains that the bodies are cut into")
     dofs: int = described("degrees of freedom of all subdomains")
     multipliers: int = described("Lagrange multipliers of the dual problem")
-    interface_nodes: int = described("nodes of the fibre-matrix interfaces, periodic images once")
+    interface_nodes: int = described("nodes of the fibre-matrix interfaces; periodic images count once")
     kernel_dim: int = described("rigid-body motions of all subdomains")
     coarse_dim: int = described("vectors of the coarse space, rigid-body motions included")
     factorizations: int = described("subdomains that were factored, each once")
@@ -160,7 +160,7 @@ class Checks:
     strain: float = described("mean strain, with the opening of debonded faces, equals E")
     hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
     jump: float | None = described(
-        "no jump where faces are glued, relative to the largest displacement; absent of a cell that is one subdomain",
+        "no jump where faces are glued, relative to the largest displacement; absent if the cell is one subdomain",
         default=None,
     )
     stress: float | None = described("prescribed stresses are met, relative to stress or stiffness", default=None)
@@ -168,11 +168,11 @@ class Checks:
     kkt_penetration: float | None = described("contact: no gap is negative", default=None)
     kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
     kkt_friction: float | None = described(
-        "friction: shear on closed faces is within mu p, that of sliding ones opposes the slip, and along the fibres "
-        "none is borne",
+        "friction: shear on sticking faces is at most mu p, on sliding faces mu p against the slip, and along the "
+        "fibres 0",
         default=None,
     )
-    symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
+    symmetry: float | None = described("L^ef is symmetric; absent if debonded faces may touch", default=None)
 
 
 @dataclass(frozen=True)
@@ -192,10 +192,10 @@ class Sensitivities:
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
     constants: tuple[str, ...] = described(
         "entries `C11`, ... of the stiffness, moduli and ratios `E1`, ..., `thermal_S11`, ..., `expansion_x1`, ...; "
-        "of a load strains and stresses that it does not give, and `stored`"
+        "of a load: the strains and stresses that it does not prescribe, and `stored`"
     )
     constant_values: Float = described("their values, each in its unit", "", "(n,)")
-    derivatives: Float = described("of each constant by each parameter", "", "(n, p)")
+    derivatives: Float = described("derivative of each constant by each parameter", "", "(n, p)")
     at_fixed_status: bool = described(
         "whether faces touch without tension: derivatives hold as long as no node opens or closes", default=False
     )
@@ -214,7 +214,7 @@ class PhaseStresses:
     hydrostatic: Float = described("largest hydrostatic stress, a third of the trace", records.STRESS, "(s,)")
     hydrostatic_at: Float = described("its position in the cell", records.LENGTH, "(s, 2)")
     criterion: str | None = described("criterion of the phase's `strength`", default=None)
-    mode: tuple[str, ...] | None = described("governing mode of Hashin: `fibre tension`, ...", default=None)
+    mode: tuple[str, ...] | None = described("governing mode in Hashin's criterion: `fibre tension`, ...", default=None)
     utilisation: Float | None = described(
         "largest utilisation of the strength: 1 at failure, proportional to the stress", "", "(s,)", default=None
     )

@@ -15,8 +15,8 @@ from feti_homog.typing import Float
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entry `effective_conductivity`, with closed forms and mesh errors.  Collective.
 
-    div q = 0 with q = -k grad T and grad T = G + grad T*: axial shear with the shear moduli k, under a gradient along
-    the fibres too, whose T* vanishes unless a phase has k13 or k23.  Column j is -<q> under the unit gradient j.
+    The problem div q = 0, q = -k grad T, grad T = G + grad T* is axial shear with k as shear moduli.  A gradient along
+    the fibres has T* = 0 unless a phase has k13 or k23.  Column j of the result is -<q> under the unit gradient j.
     """
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     k = columns["stiffness"]
@@ -40,7 +40,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
-    """Return closed forms of a cell; None with voids, debonded arcs, and phases with a direction in the plane.
+    """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.
 
     A fibre of radius a with the conductance h acts like a fibre with conductivity 1 / (1/k + 1/(h a)).  Collective.
     """

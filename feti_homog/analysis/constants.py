@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Named = Mapping[str, Float]
 PARTS = ("absolute", "signed", "least")
-OFF = 3.0  # largest ratio of the true energy error to the estimated one
+OFF = 3.0  # largest ratio of the true energy error to the estimate
 
 
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 
 
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
-    """Return a radius for each fibre phase; None if closed estimates do not apply (on springs, radii must be equal)."""
+    """Return a radius for each fibre phase; None if closed forms do not apply (springs need equal radii)."""
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
     is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)
@@ -174,7 +174,7 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
     finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
     line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
     context.notes.append(
-        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
+        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} would be fine enough"
     )
 
 
@@ -183,8 +183,8 @@ def _note_bounds(
 ) -> None:
     """Note constants outside their bounds; record faults beyond any mesh error.
 
-    No relative error of a constant exceeds `energy`, the largest relative error of the strain energy; the true error
-    is at most OFF times the estimate.  A bound applies to a cell with its symmetry.
+    The relative error of a constant is at most `energy`, the largest relative error of the strain energy; true errors
+    are at most OFF times the estimates.  A bound applies only if the cell has the symmetry that the bound assumes.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")
@@ -204,7 +204,7 @@ def note_outside(
 ) -> None:
     """Note each value outside its limits; record a fault beyond any mesh error, as `_note_bounds`.
 
-    Limits are of effective constants: those of a cell that is not periodic may lie outside.
+    The limits bound effective constants; constants of a cell that is not periodic may lie outside.
     """
     if context.case.cell.boundary != "periodic":
         return

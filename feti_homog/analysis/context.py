@@ -105,7 +105,7 @@ class AnalysisContext:
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
         events: name of the file with all these lines.
-        opening: function of the context for the entries of result.json before the analysis, as text.  Collective.
+        opening: returns, as text, the entries of result.json that are known before the analysis.  Collective.
         undetermined: undetermined strains at each point under one load.
         excess: largest ratio of the strains under one load to the strains of the bonded cell.
         notes: remarks on the result.
@@ -205,7 +205,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the entries of a point: debonding under the last plane strain, iterations.  Collective."""
+        """Return a path point's entries: debonding under the last plane strain, and iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -22,7 +22,7 @@ from feti_homog.materials import voigt
 from feti_homog.results import landmarks, path_curves
 from feti_homog.system.runtime import records, standard_streams
 
-OF_FIBRES = ("debonded_length", "debonding_angle")  # lists of a point, kept where its fields are
+OF_FIBRES = ("debonded_length", "debonding_angle")  # lists over fibres, kept at points whose fields are kept
 NAMED_FIBRES = 8  # most fibre names in a remark
 
 
@@ -36,8 +36,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
     """Follow a path and return its `Result` entries.  Collective.
 
-    `path` has a point for each event or increment, `states` the numbers of points with fields.  Each point is written
-    to the checkpoint at once.
+    The entry `path` has a point for each event or increment; `states` has the numbers of points with fields.  Each
+    point is written to the checkpoint at once.
     """
     check_accuracy(context)
     count = min(path_events.resumable(context), path.max_events)
@@ -57,7 +57,7 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             if before is None and point.state.converged:
                 cell, light = context.loads.interfaces, point.broke == 0 < point.softened
                 event = path_events.stored(point, bond, responses, work, cell, _without_lists(entry))
-                context.checkpoint.write(number, *event, light=light)  # many small drops are cheap to compute again
+                context.checkpoint.write(number, *event, light=light)  # softening alone is cheap to compute again
                 line = f"{number + 1} points kept in {context.directory}: --resume goes on, plot and report show them"
                 standard_streams.remarks[:] = [line] * (context.directory is not None)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
@@ -224,7 +224,7 @@ def _completed(
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
         context.notes.append(
             f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
-            "and the path has one of them, by the order of nodes"
+            "and the path follows one of them, which depends on the order of nodes"
         )
     for number, mark in marks.items():
         entries[number]["mark"] = mark

@@ -66,8 +66,8 @@ def stored(
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`, the
-    `entry` that of the point in result.json.
+    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`; `entry`
+    is the point's entry in result.json.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -198,7 +198,7 @@ def resumable(context: AnalysisContext) -> int:
 
 
 def consistent(context: AnalysisContext, count: int) -> int:
-    """Count the events before the first with other arrays, bonds, loads or sums than a path has.  Collective."""
+    """Count leading events whose arrays, bonds, loads and sums fit a path.  Collective."""
     cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
     waypoints = [context.loads.load(target) for target in context.case.targets]
     waypoints, legs = [Load(0.0 * waypoints[0].values, waypoints[0].by_stress), *waypoints], len(waypoints)
@@ -251,7 +251,7 @@ def holding(context: AnalysisContext, count: int) -> int:
 
 
 def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Return types and shapes of this rank's arrays of an event.  Collective."""
+    """Return types and shapes of this rank's arrays in an event.  Collective."""
     cell, bonds = context.loads.interfaces, context.bonds(None)
     if context.case.has_friction:
         bonds = replace(bonds, gap_and_slip=np.zeros((len(bonds.status), 2)), sliding=bonds.status)
@@ -270,7 +270,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
-    """Count this rank's bonds that part; -1 for other arrays, numbers that are none, or bonds that heal."""
+    """Count this rank's bonds that part; -1 for wrong arrays, impossible numbers, or bonds that heal."""
     kept = {name: of for name, of in layout.items() if "lam" in event or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != kept:
         return -1

@@ -112,7 +112,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record the states of labels, from the response, or None, in each problem.  Collective."""
+        """Record labelled states; a state has a response, or None, for each problem.  Collective."""
         if not self.is_recording:
             return
         fields = recovered_fields.recover(self._cell, [*states.values()])

@@ -22,7 +22,7 @@ LOADS = ("strain", "stress", "temperature", "to", "waypoints", "first_break_stra
 ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
             "toughness", "G_I", "G_II")  # fmt: skip
 POWERS = dict.fromkeys(LOADS, 1) | dict.fromkeys(ENERGIES, 2)
-"""Powers of s of the numbers in entries of result.json, and in all tables and lists below; others stay."""
+"""Powers of s for entries of result.json and the tables and lists inside them; other numbers do not change."""
 CONSTANTS = ("moduli", "constants", "transversely_isotropic", "transverse_moduli")
 Part = TypeVar(
     "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart
@@ -93,7 +93,7 @@ class Result:
     solver: cell_records.SolverInfo = described("how the dual problem was solved")
     checks: cell_records.Checks = described("largest relative error of each law over all states")
     check_tolerance: float = described("largest error of a check that passes")
-    kkt_tolerance: float = described("the same of the checks of contact")
+    kkt_tolerance: float = described("largest error of a contact check that passes")
     warnings: tuple[str, ...] = described("settings that are valid but probably unintended")
     remarks: tuple[str, ...] = described("assumptions about settings that the case does not give", default=())
     faults: tuple[str, ...] = described("solves that did not converge and checks that failed")
@@ -104,7 +104,7 @@ class Result:
         "L^ef: columns are stresses under unit strains", records.STRESS, result_records.EITHER_STIFFNESS, default=None
     )
     effective_stiffness_compression: Float | None = described(
-        "the same under minus these, with contact", records.STRESS, result_records.EITHER_STIFFNESS, default=None
+        "the same under minus the strains, with contact", records.STRESS, result_records.EITHER_STIFFNESS, default=None
     )
     effective_conductivity: Float | None = described(
         "k^ef in the axes x1, x2, x3: columns are minus the mean fluxes under unit gradients of the temperature",
@@ -113,19 +113,19 @@ class Result:
         default=None,
     )
     compliance: Float | None = described(
-        "of generalized plane strain: inverse of L^ef", f"1 / {records.STRESS}", "(6, 6)", default=None
+        "inverse of L^ef, in generalized plane strain", f"1 / {records.STRESS}", "(6, 6)", default=None
     )
     thermal_stress: Float | None = described(
         "stress under a unit of temperature, if the phases expand", result_records.PER_DEGREE, "(6,)", default=None
     )
     thermal_stress_compression: Float | None = described(
-        "minus the stress under minus a unit, with contact", result_records.PER_DEGREE, "(6,)", default=None
+        "minus the stress under minus one degree, with contact", result_records.PER_DEGREE, "(6,)", default=None
     )
     thermal_expansion: Float | None = described(
         "strains under a unit of temperature at no stress, without contact", "1 / temperature", "(6,)", default=None
     )
     constants: engineering_constants.EngineeringConstants | None = described(
-        "of generalized plane strain: constants in the axes of the cell", default=None
+        "engineering constants in the axes of the cell, in generalized plane strain", default=None
     )
     transversely_isotropic: engineering_constants.TransverseIsotropy | None = described(
         "constants of the nearest transversely isotropic stiffness about x3", default=None
@@ -133,8 +133,8 @@ class Result:
     transverse_moduli: engineering_constants.TransverseModuli | None = described(
         "ranges of Young's and shear moduli across the fibres", default=None
     )
-    estimates: phase_bounds.Estimates | None = described("closed estimates, without debonding", default=None)
-    fibre_bounds: phase_bounds.FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
+    estimates: phase_bounds.Estimates | None = described("closed-form estimates, without debonding", default=None)
+    fibre_bounds: phase_bounds.FibreBounds | None = described("bounds on the same, for rigid bonds", default=None)
     conductivity_estimates: phase_bounds.ConductivityEstimates | None = described(
         "closed forms of a conductivity, without debonding and voids", default=None
     )
@@ -149,7 +149,7 @@ class Result:
         "directions of analysis `envelope`, as in envelope.csv", default=None
     )
     states: tuple[int, ...] | None = described(
-        "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
+        "numbers, from 0, of the path points whose fields are kept; entry K belongs to /state/K", default=None
     )
     phase_stresses: tuple[cell_records.PhaseStresses, ...] | None = described(
         "largest stresses of each phase in each state with fields; also without fields if a phase has a strength",
@@ -164,7 +164,7 @@ class Result:
     )
     memory: int = described("peak resident memory, the largest over ranks", records.BYTES)
     checksum: str | None = described(
-        "of result.json: CRC-32, in hexadecimal, of its text without this key; checked and taken away when it is read",
+        "CRC-32, in hexadecimal, of the text of result.json without this key; checked and removed by a reader",
         default=None,
     )
     fields: Fields | None = field(default=None, repr=False, compare=False)
@@ -232,9 +232,9 @@ class Result:
         return replace(Result.of(document), states=None, result_h5=None)
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number of a record of CONSTANTS by its name, such as E1, nu12, G12 or E_axial.
+        """Return a number by its name in a record of CONSTANTS, such as E1, nu12, G12 or E_axial.
 
-        Raises AttributeError, with the record that has the name, or with near names.
+        Raises AttributeError, which names the record with this attribute, or similar names.
         """
         parts = {key: vars(part) for key, part in vars(self).items() if is_dataclass(part)}
         table = {key: value for record in CONSTANTS for key, value in parts.get(record, {}).items()}
@@ -263,7 +263,7 @@ RECORDS = (*filter(is_dataclass, (*vars(cell_records).values(), *vars(result_rec
 
 
 def _times(value: Any, s: float, power: int = 0) -> Any:
-    """Multiply the numbers in a value by s to the power of their entry."""
+    """Multiply the numbers in a value by s^k, with the power k of their entry in POWERS."""
     if isinstance(value, Mapping):
         return {name: _times(item, s, POWERS.get(name, power)) for name, item in value.items()}
     if isinstance(value, list | tuple):

@@ -17,16 +17,16 @@ ENERGY = f"{records.STRESS} times that of the cell"
 CONDUCTIVITY = "conductivity"
 PER_DEGREE = f"{records.STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
-DEBONDED_LENGTH, KEPT = "debonded length of each fibre's interface", "of points whose fields `states` keeps"
+DEBONDED_LENGTH, KEPT = "debonded length of each fibre's interface", "only at points whose fields `states` keeps"
 DEBONDED_ANGLE = (
-    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
-    "interface too, 360 times the share of its interfaces"
+    "the same in degrees of arc, `debonded_length` / radius; for a fibre that is not round, or whose coating has an "
+    "interface too, 360 times the debonded share of its interfaces"
 )
 
-OWN_SECTION = "number, from 1, of its section [[interface]]; absent where there is one"
+OWN_SECTION = "number, from 1, of its [[interface]] section; absent if there is only one section"
 OF_STRAINS: dict[str, Any] = {"components": voigt.STRAINS, "spatial_components": voigt.SPATIAL_STRAINS}
 OF_STRESSES: dict[str, Any] = {"components": voigt.STRESSES, "spatial_components": voigt.SPATIAL_STRESSES}
-DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in their order; absent where there is one"
+DEBONDED_SHARES = "the same share for each [[interface]] section, in order; absent if there is only one section"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
@@ -44,7 +44,7 @@ class MeshErrors:
     )
     thermal_expansion: Float | None = described("error of each entry", "1 / temperature", "(6,)", default=None)
     constants: Mapping[str, float] = described(
-        "errors of moduli and constants, each in its unit", entries={"NAME": "that of one, as of `E1`"}
+        "errors of moduli and constants, each in its unit", entries={"NAME": "error of one constant, such as `E1`"}
     )
     energy: float = described("relative error of the strain energy, the largest under any strain")
 
@@ -59,7 +59,7 @@ class Tips:
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
     angle: Float = described(
-        "direction from the fibre's centre; of a fibre without centre that of its normal", records.DEGREES, "(t,)"
+        "direction from the fibre's centre; of the normal, if the fibre has no centre", records.DEGREES, "(t,)"
     )
     G_I: Float = described("energy release rate in opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
     G_II: Float = described("energy release rate in shear", ENERGY, "(t,)")
@@ -75,8 +75,8 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "under which unit strain: `E11`, `E22`, `gamma12`, `-E11` of minus it, ...; of other loads none; "
-        "`strain`: the strain that is given"
+        "load: a unit strain `E11`, `E22` or `gamma12`, minus a unit strain `-E11`, ..., or the given strain `strain`; "
+        "other loads have no rates"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")
@@ -102,25 +102,25 @@ class AnglePoint:
         default=None,
     )
     thermal_stress: Float | None = described(
-        "stress under a unit of temperature at no strain, of generalized plane strain",
+        "stress under a unit of temperature at no strain, in generalized plane strain",
         PER_DEGREE,
         "(6,)",
         tuple(f"thermal_{name}" for name in voigt.SPATIAL_STRESSES),
         default=None,
     )
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", voigt.STRAINS, default=None)
-    stress: Float | None = described("stress under it", records.STRESS, "(3,)", voigt.STRESSES, default=None)
-    stored: float | None = described("energy stored under it per area of the cell", records.STRESS, default=None)
-    stored_in_springs: float | None = described("the share of elastic interfaces in it", records.STRESS, default=None)
+    stress: Float | None = described("stress under this strain", records.STRESS, "(3,)", voigt.STRESSES, default=None)
+    stored: float | None = described("energy under this strain, per area of the cell", records.STRESS, default=None)
+    stored_in_springs: float | None = described("part of `stored` in elastic bonds", records.STRESS, default=None)
     mesh_error: float | None = described(
-        "estimated relative error of the strain energy by the mesh, of unit strains the largest", default=None
+        "estimated relative mesh error of the strain energy; without a given strain, the largest", default=None
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described(DEBONDED_LENGTH, records.LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
-    bonded: int = described("bonded interface nodes; of unit strains under gamma12, as the next two")
+    bonded: int = described("bonded interface nodes; without a given strain, under gamma12, as the next two")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
@@ -133,7 +133,7 @@ class PathPoint:
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
     strain: Float = described("macroscopic strain", "", EITHER, **OF_STRAINS)
     stress: Float = described(
-        "macroscopic stress: of events before the bonds that `broke` break, of increments after them",
+        "macroscopic stress: at an event before bonds break, at an increment after they broke",
         records.STRESS,
         EITHER,
         **OF_STRESSES,
@@ -145,42 +145,42 @@ class PathPoint:
         default=None,
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
-    softened: int | None = described("bonds that lose a tooth at this event but hold, of softening laws", default=None)
+    softened: int | None = described("with softening: bonds that lose a tooth here but hold", default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", records.STRESS)
-    stored_in_springs: float = described("the share of elastic interfaces in it", records.STRESS)
+    stored_in_springs: float = described("part of `stored` in elastic bonds", records.STRESS)
     mesh_error: float | None = described(
-        "estimated relative error of `stored` by the mesh, at the points that `states` in [output] chooses",
+        "estimated relative mesh error of `stored`, at the points that `states` in [output] chooses",
         default=None,
     )
     work: float = described(
-        "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together, with "
-        "friction and `friction_heat`",
+        "work of the loads, with a temperature, so far per area of the cell: `stored` + `dissipated`, with friction + "
+        "`friction_heat`",
         records.STRESS,
     )
     dissipated: float = described("energy lost to breaks so far per cell area, along all equilibria", records.STRESS)
     dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", records.STRESS)
     friction_heat: float | None = described(
-        "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this",
+        "frictional heat so far per area of the cell; `work` is the sum of `stored`, `dissipated` and this heat",
         records.STRESS,
         default=None,
     )
     fracture_energy: float | None = described(
         "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
-        "per area of the cell; of bonds that break by energy",
+        "per area of the cell; only for bonds that break by energy",
         records.STRESS,
         default=None,
     )
     dissipation_ratio: float | None = described(
-        "`dissipated`, all of it, / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone",
+        "`dissipated` / `fracture_energy`, once a bond has broken; 1 if breaks lose only the toughness",
         default=None,
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
-    damaged_share: float | None = described("the same of damaged bonds that hold, of laws that soften", default=None)
+    damaged_share: float | None = described("with softening: share of damaged bonds that hold", default=None)
     debonded_length: Float | None = described(f"{DEBONDED_LENGTH}, {KEPT}", records.LENGTH, "(f,)", default=None)
     debonding_angle: Float | None = described(f"{DEBONDED_ANGLE}; {KEPT}", records.DEGREES, "(f,)", default=None)
-    tips: Tips | None = described("of bonds that break by energy, at points of `states` in [output]", default=None)
+    tips: Tips | None = described("tips, if bonds break by energy, at points of `states` in [output]", default=None)
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
@@ -189,15 +189,15 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress on a path up to its deepest fall.
+    """The largest stress on a path before the deepest fall of the stress.
 
-    Its component has the largest strain that the loads change, up to the end of the leg with the first break.
+    The stress component is conjugate to the largest strain that changes up to the end of the leg with the first break.
     """
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described("the largest up to that fall, or of all without one, signed", records.STRESS)
-    strain: float = described("macroscopic strain there")
+    stress: float = described("largest stress up to the deepest fall, or at any point without a fall", records.STRESS)
+    strain: float = described("macroscopic strain at the peak")
     event: int = described("number of its point in `path`, from 0")
     first_break_stress: float | None = described("stress where the first bonds break", records.STRESS, default=None)
     first_break_strain: float | None = described("strain there", default=None)
@@ -212,14 +212,14 @@ class Peak:
     fibre: int | None = described("fibre of the most utilised bond at the peak, from 1", default=None)
     angle: float | None = described("direction of that bond from the centre", records.DEGREES, default=None)
     stress_left: float | None = described(
-        "stress in the valley of that fall, the load only rising on a path of one leg; absent where it never falls by "
-        "1 % as bonds break",
+        "stress in the valley of the fall, on a path of one leg with a load that only rises; absent if the stress "
+        "never falls by 1 % as bonds break",
         records.STRESS,
         default=None,
     )
     event_left: int | None = described("number of the point on whose branch the valley is", default=None)
     so_far: bool = described(
-        "true of a path that was cut off before such a fall: no peak, a longer path may go higher", default=False
+        "true if the path ends before such a fall: not a peak, since a longer path may go higher", default=False
     )
     dissipated: float = described("energy lost to breaks before the peak, per area of the cell", records.STRESS)
 
@@ -233,14 +233,14 @@ class LoadPoint:
     temperature: float | None = described(TEMPERATURE, default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", records.STRESS)
-    stored_in_springs: float = described("the share of elastic interfaces in it", records.STRESS)
-    mesh_error: float | None = described("estimated relative error of `stored` by the mesh", default=None)
+    stored_in_springs: float = described("part of `stored` in elastic bonds", records.STRESS)
+    mesh_error: float | None = described("estimated relative mesh error of `stored`", default=None)
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described(DEBONDED_LENGTH, records.LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
     tips: TipRates | None = described(
-        "energy release rates at the tips of its arcs; absent under loads other than strains of the plane", default=None
+        "energy release rates at the tips of its arcs; absent unless only in-plane strains act", default=None
     )
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
@@ -266,7 +266,7 @@ class EnvelopePoint:
     fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
     interface: int | None = described(OWN_SECTION, default=None)
     bond_angle: float | None = described(
-        "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
+        "direction of that bond from the fibre's centre; of the normal, if the fibre has no centre",
         records.DEGREES,
         default=None,
     )

@@ -229,9 +229,9 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
-    """Print the summary on rank 0, without warnings, which are printed before, and faults, which the error says.
+    """Print the summary on rank 0, without warnings and faults.  Collective.
 
-    Other ranks load no tables.  Collective.
+    Warnings were printed before; the error that follows states the faults.  Other ranks load no tables.
     """
     timings = progress.timings()
     if progress.prints:

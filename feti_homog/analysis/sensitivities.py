@@ -54,8 +54,8 @@ def sensitivities(
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[averaging.Response]) -> dict[str, Any]:
     """Return the `Result` entry `sensitivities` of the state under one load.  Collective.
 
-    The faces stay fixed as in the state.  With the cell stiffness A for these faces A x = s, where the load prescribes
-    each component of x or of s.  The free strains follow from A dx = -dA x, the stored energy changes by d(x.s / 2).
+    The faces stay fixed as in the state.  With the cell stiffness A for these faces, A x = s; the load prescribes x or
+    s in each component.  The free strains follow from A dx = -dA x; the stored energy changes by d(x.s / 2).
     """
     fixed = _at_status(context, "load", responses, range(len(context.loads.problems)))
     A = block_diag(*(np.stack([r.stress for r in group], axis=1) for group in fixed))
@@ -114,9 +114,9 @@ def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, fl
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
 ) -> list[list[averaging.Response]]:
-    """Return unit load responses with the faces fixed as in one state.  Collective.
+    """Return the responses to unit loads with faces fixed as in the state `name`.  Collective.
 
-    `states` are the responses of the state `name`; the result has a list for each of the `problems`, by number.
+    `states` are the responses of this state.  The result is a list of responses for each number in `problems`.
     """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for problem in (context.loads.problems[k] for k in problems):

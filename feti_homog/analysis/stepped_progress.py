@@ -40,7 +40,7 @@ def shown(
         since = (now, reached, count) if known else since
         seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
         text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
-        if gain:  # first, since a narrow terminal shows the begin
+        if gain:  # first, since a narrow terminal shows the beginning
             text = f"{timedelta(seconds=round(min(seconds * (1.0 - reached) / gain, 1e9)))} left, {text}"
         if bar is not None:
             bar.set_postfix_str(text, refresh=False)

@@ -25,7 +25,7 @@ def read(directory: Path) -> dict[str, Any]:
         size = len(voigt.plane_state_of(document).components)
         points = result.path or ()
         if not all(0.0 < p.load_factor <= 1.0 and len(p.strain) == len(p.stress) == size for p in points):
-            raise CaseError(f"{directory / checkpoints.FOLDER}: it is damaged: its points are not of its case")
+            raise CaseError(f"{directory / checkpoints.FOLDER}: it is damaged: its points do not fit its case")
     elif result.case["output"].get("fields", True):
         _check_fields(directory, result)
     return document
@@ -47,7 +47,7 @@ def check_to_draw(directory: Path) -> str:
 
 
 def finished(directory: Path, case: Case, ranks: int) -> bool:
-    """Return whether a folder without checkpoint has a case's whole result.  Call on one rank.
+    """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged or belongs to another case, the checkpoint also to another number of ranks.

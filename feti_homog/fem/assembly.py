@@ -1,7 +1,7 @@
 """Assembly in one subdomain: stiffness, unit strain loads, averages, integrals along voids.
 
-Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are summed
-first, to one `MacroElement`; all affine coarse triangles have the same reference integrals.
+Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
+summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _affine(
 def _curved(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate coarse triangles with curved edges, element by element; arguments as of `_affine`."""
+    """Integrate coarse triangles with curved edges, element by element; arguments as in `_affine`."""
     elements = mesh.lattice.triangles
     points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
     g, w = gradients(points)

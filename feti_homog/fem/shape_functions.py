@@ -31,7 +31,7 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """Return the reference gradients (q, a, 2) of a shape functions, and the quadrature weights (q,).
+    """Return the reference gradients (q, a, 2) of the shape functions, and the quadrature weights (q,).
 
     The functions are 3 linear, 6 quadratic, or 7: the quadratic functions and the bubble 27 r_0 r_1 r_2.
     """

@@ -1,4 +1,4 @@
-"""Recovered stresses in the subdomains, and the energy of their difference to the element stresses.
+"""Recovered stresses in the subdomains, and the energy of their difference from the element stresses.
 
 After Zienkiewicz and Zhu (IJNME 33 (1992) 1331), a polynomial of the element order is fitted about every vertex to the
 stresses at the integration points of the surrounding elements.  Barycentric coordinates blend the three vertex fits of

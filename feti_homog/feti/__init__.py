@@ -1,7 +1,7 @@
 """The dual problem of the torn cell, from subdomains and multipliers to the projected Krylov solver.
 
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.linalg`, `feti.operators`, `mesh` and `system`.
-Main entry: `solver.FetiSolver`.  The floors of this package; imports point downwards:
+Main entry: `solver.FetiSolver`.  Floors of the package, the highest first; a floor imports only floors below it:
 
     solver, solver_plan, krylov, dual_solution, confirmation
     coarse           natural coarse space; adaptive coarse space and its preconditioner

@@ -68,7 +68,7 @@ class InfluenceSolutions:
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
         """Compute the multipliers H d E (owned rows, k) for loads E (v, k).  Collective.
 
-        If `solutions` has predicted these multipliers up to the factors `weights` (k,), no column is computed.
+        If `solutions` has just made a prediction, its multipliers times `weights` (k,) are returned instead.
         """
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
@@ -76,7 +76,7 @@ class InfluenceSolutions:
         """Compare solutions by F lambda with the prediction, and renew the quota.  Collective.
 
         The quota drops to 0 if a solution needed iterations, or if `solutions` is empty because a load causes no jump
-        on the active rows.  A prediction with an error above MOST_FOLLOWED_ERROR and rounding is computed anew.
+        on the active rows.  A prediction is computed anew if its error exceeds MOST_FOLLOWED_ERROR and rounding.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.

@@ -20,8 +20,8 @@ class DualSolution:
     """The solution of the dual problem, Eqs. (36) and (37), under one load.
 
     Attributes:
-        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem; with tractions on the
-            sides (v + m,), with their Sigma at the end.
+        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem; (v + m,) for tractions
+            on the sides, whose Sigma comes last.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
@@ -85,7 +85,7 @@ class ActiveJumps:
         machine precision times `torn`, the bound is at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
 
         Args:
-            displacement: (boundary dofs, v) displacements of the torn cell under the unit loads, equal at every call.
+            displacement: (boundary dofs, v) displacements of the torn cell under unit loads, the same at every call.
             active: (k,) norms of the projected jumps on the active rows.
             torn: (k,) norms of the jumps on all rows.
         """
@@ -138,7 +138,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Compute F lambda for a solution of the present state, which adds alpha.
+        """Complete a solution of the present state by F lambda, which gives alpha.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
@@ -153,7 +153,7 @@ def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
     For displacements u = K+ f (boundary dofs, v), the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps
-    under forces as large as the rounding of K u.  Between stiff subdomains, a soft one moves far.
+    under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far under such forces.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

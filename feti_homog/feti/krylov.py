@@ -19,7 +19,7 @@ from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
 REASON = PETSc.KSP.ConvergedReason
-# PETSc's reasons for a stop by rounding.
+# PETSc's reasons for a stop that rounding causes.
 BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
 # Methods that apply the preconditioner to the residual itself, which gives the jump.  With other methods the
 # convergence test sees the forces alone, and the checks of a response test the jump.
@@ -34,7 +34,7 @@ class ProjectedProblem:
     def __init__(
         self, errors: c_functions.CallbackErrors, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int
     ) -> None:
-        """Set up products with vectors that hold a number of load cases, `columns`."""
+        """Set up products with vectors that hold `columns` load cases."""
         self._errors, self._preconditioner, self._jumps = errors, preconditioner, jumps
         self._residual = np.zeros((0, columns))
         self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
@@ -164,7 +164,7 @@ class Krylov:
         self.ksp.setComputeSingularValues(permitted <= max(MAX_ITERATIONS, sizes[1]))
 
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
-        """Solve P F lam = right for projected jumps (rows, k) from multipliers lam (rows, k).  Collective.
+        """Solve P F lam = `right` for projected jumps `right` (rows, k), starting from `lam` (rows, k).  Collective.
 
         With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
         so that only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their

@@ -6,9 +6,9 @@ With f = -Q E for a load E (v,), which begins with the macroscopic strain, Eqs. 
 
 C is the compliance of elastic bonds: their faces part by B u* = C lam.  Rigid bonds (glue) have C = 0.
 
-Where tractions t = Sigma n are given on the sides, Sigma (m,) follows E among the loads, such that the sides keep the
-mean strain: int u* (x) n ds = 0, which makes E the mean strain and Sigma the mean stress (`FetiSolver.closure`).
-Tractions push single subdomains: then G^T lam = -R^T Q E.
+Where tractions t = Sigma n act on the sides, Sigma (m,) follows E among the loads.  Sigma is chosen so that
+int u* (x) n ds = 0 on the sides: then E is the mean strain and Sigma the mean stress (`FetiSolver.closure`).
+Tractions do work on rigid-body motions of subdomains: then G^T lam = -R^T Q E.
 """
 
 import weakref
@@ -52,7 +52,7 @@ class FetiSolver:
         natural: rigid-body motions, G and P.
         adaptive: coarse space of the preconditioner, or None.
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
-        active, jumps: rows that carry multipliers, and the jumps there.
+        active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.
         condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
         method: names of preconditioner and coarse space for the summary.
@@ -92,7 +92,7 @@ class FetiSolver:
             from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self.jumps)
-        # Without given Sigma on the sides E is the load, without solutions.
+        # The loads of unit strains, and their solutions; without tractions on the sides, the loads are the strains.
         self._closure, self._units = np.eye(len(problem.loads)), list[DualSolution]()
         self._view = PETSc.Options("feti_").getBool("view", False)
         # Shell contexts call Python, so the solver destroys them: PETSc finalizes after the interpreter has shut down.
@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = torn_stiffness E + d^T lam, and of pulled sides -int u* (x) n ds.  Collective."""
+        """Compute |UC| Sigma = torn_stiffness E + d^T lam; for pulled sides also -int u* (x) n ds.  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and solution.alpha is not None:
             local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
@@ -170,19 +170,19 @@ class FetiSolver:
 
     @cached_property
     def _pushes(self) -> Float:
-        """Compute R^T Q (owned modes, v + m) of tractions on sides; without, (owned modes, v) and 0."""
+        """Compute the work R^T Q (owned modes, v + m) of tractions on kernels; 0 for the v strains."""
         pushes: Float = np.concatenate([self.condensed.boundary[:0], *(s.R.T @ s.Q for s in self.subdomains)])
         pushes[:, : len(self.problem.loads)] = 0.0
         return pushes
 
     @property
     def is_pulled(self) -> bool:
-        """Return whether tractions are given on the sides, which push subdomains."""
+        """Return whether tractions are given on the sides, and subdomains have rigid motions."""
         return self.natural.kernel_dimension > 0 and self.condensed.boundary.shape[1] > len(self.problem.loads)
 
     @property
     def closure(self) -> Float:
-        """Return the loads (v + m, v) under unit E: E, and Sigma on the sides, if given, that keeps the mean strain.
+        """Return the loads (v + m, v) of unit strains: E, and with tractions the Sigma that keeps E the mean strain.
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """
@@ -205,8 +205,8 @@ class FetiSolver:
         """Solve the dual problems for k loads together.  Collective.
 
         One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
-        With tractions on the sides, the solutions that gave `closure` superpose.  With influence columns, raises as
-        `InfluenceSolutions.record`.
+        With tractions on the sides, the solutions that gave `closure` are superposed.  With influence columns, raises
+        as `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.

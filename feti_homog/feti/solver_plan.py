@@ -58,7 +58,7 @@ class SolverOptions:
     def read(
         cls, text: Callable[[str, str], str], number: Callable[[str, float], float], thresholds: Thresholds = DEFAULTS
     ) -> SolverOptions:
-        """Read the options by `text(name, default)` and `number(name, default)`; names lack `feti_`.
+        """Read the options by `text(name, default)` and `number(name, default)`; names omit the prefix `feti_`.
 
         Raises:
             CaseError: the value of an option is unknown.
@@ -133,9 +133,9 @@ class SolverPlan:
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
     """Choose the preconditioner and the coarse space from sizes and options.
 
-    By default, influence columns serve dense problems with a thin body, and dense problems with at least
-    `influence_applications` products and at most `assembled_schur_dofs` shared dofs; BONDED serves `one_each` with at
-    most `dense_boundary_dofs` shared dofs, "dirichlet" all other problems.
+    If all operators are dense, the default is influence columns for a thin body, or for at least
+    `influence_applications` products and at most `assembled_schur_dofs` shared dofs, else BONDED for `one_each` and at
+    most `dense_boundary_dofs` shared dofs.  In all other cases the default is "dirichlet".
 
     Raises:
         CaseError: two options exclude each other.
@@ -162,7 +162,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct the preconditioner `name`, as in `SolverPlan`.  Collective.
+    """Construct the preconditioner that `name` selects, as in `SolverPlan`.  Collective.
 
     The modules of `feti.exact` are imported only where a preconditioner needs them.
     """

@@ -82,7 +82,7 @@ COPIED_COLUMNS = 20
 # METIS needs integer edge weights: lengths are rounded up to multiples of the longest edge over this number.  Cuts are
 # 5 % shorter, but more numerous, than with one class (`tests/unit/feti/decomposition/test_partition.py`).
 LENGTH_CLASSES = 100
-# Largest load of a rank, relative to the most even assignment, for which neighbours stay together; imbalance of METIS.
+# Largest load of a rank, relative to the most even assignment, for which neighbours stay together, as METIS allows.
 MAX_IMBALANCE = 1.03
 # Largest difference of a strip from half of the triangles, relative to all triangles; number of strip widths tried.
 STRIP_SLACK, STRIP_WIDTHS = 0.01, 33
@@ -132,10 +132,10 @@ ZERO_JUMP, ROUNDING_MARGIN = 1e-13, 100.0
 
 # Largest number of solves by influence columns between two confirmations by F lambda.
 MOST_UNCONFIRMED = 32
-# Relative error, measured by F lambda, of multipliers by influence columns above which a run ends as by its checks; and
-# of multipliers and jumps by followed columns above which they are computed anew.
+# Relative errors, measured by F lambda: of multipliers by influence columns, above which the run fails; of multipliers
+# and jumps by followed columns, above which both are computed anew.
 MOST_UNCONFIRMED_ERROR, MOST_FOLLOWED_ERROR = 1e-5, 1e-11
-# Relative size below which followed columns give no pivots, jumps or forces: the error would exceed the first bound.
+# Relative size below which pivots, jumps and forces by followed columns are rejected: errors could exceed 1e-5.
 LEAST_FOLLOWED = MOST_FOLLOWED_ERROR / MOST_UNCONFIRMED_ERROR
 # Largest error, relative to the largest entry, that counts as rounding: asymmetry of new columns, above which the
 # response gets a new reference cell; half the error by F lambda where new multipliers are no better.
@@ -144,7 +144,7 @@ MOST_ROUNDING = 1e-9
 # Cells with at most NEVER_REFACTORED_ROWS rows never gain by a new factor; from this number of followed columns (8
 # bytes an owned row) on, unused columns are dropped (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
-# Changes that wait until they are applied to all followed columns (`scripts/benchmark_path --to-the-end`).
+# Changes that are collected before they are applied to all followed columns (`scripts/benchmark_path --to-the-end`).
 WAITING_COLUMNS = 32
 # Fraction of the followed columns that stay when there is no room for new columns.
 FOLLOWED_SHARE = 0.75

@@ -16,8 +16,8 @@ from feti_homog.mesh.outline import outline
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# The singular stress at a tip causes an energy error of about the element size at the tip; the rest of the mesh errs by
-# h^(2 order). At this fraction of the balanced size tips err no more than the rest (`scripts/measure_tips.py`).
+# The singular stress at a tip causes an energy error proportional to the element size there; the error of the rest is
+# of the order h^(2 order). At this fraction of the balanced size tips err no more (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
 # Largest default ratio of the triangles that tips add to the triangles of a mesh for several openings.
 TIP_TRIANGLES = 2.0
@@ -36,14 +36,14 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips / cell width; None for the size on interfaces.
+    """Return the element size at tips / cell width; None means the size on interfaces.
 
-    Without `tip_size` in the case the size is, with the mean radius / width R,
+    Without `tip_size` in the case the size is, for the mean fibre radius R / cell width,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    but with several openings the size is so large that tips take at most TIP_TRIANGLES.  Along paths, and so in
-    envelopes, tips move, and only `tip_size` counts.
+    or larger with several openings, so that tips add at most TIP_TRIANGLES.  Along paths, and so in envelopes, tips
+    move: the size is then `tip_size` alone.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
@@ -60,7 +60,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """The interface nodes (k,) on rank 0 before refinement: fibres from 1, interfaces, directions in degrees."""
+    """The interface nodes (k,) on rank 0 before refinement: fibre number from 1, interface, direction in degrees."""
 
     fibre: Int
     pair: Int
@@ -71,7 +71,7 @@ class EstimatedNodes:
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
         """Place nodes on chords that may debond, except vertices that never part.
 
-        `pairs` as in `share_entities`, `numbers` (constituents,) number the fibres.
+        `pairs` are as in `share_entities`; `numbers` (constituents,) are fibre numbers.
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
@@ -106,8 +106,8 @@ def checked(
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
     """Return the moved tips by interface, and the `faults` of the case with the faults of arcs.
 
-    An arc may lie on a fibre that cannot have it.  Without other faults, arcs and nonzero [angle] openings that select
-    no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.
+    Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
+    select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.
     """
     lines, moved = list(faults), nodes.moved_tips(case, len(centres))
     for label, interface in interface_section.labelled(case.interfaces):

@@ -68,7 +68,7 @@ class Response:
 
     @property
     def all_loads(self) -> Float:
-        """The loads of the response, `DualSolution.strain`."""
+        """The loads of the response: all entries of `DualSolution.strain`, scaled."""
         return self.scale * self.state.solution.strain
 
     @property
@@ -112,7 +112,7 @@ class Homogenization:
     def respond(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Response]:
         """Solve the unit-cell problem under each strain, and average.  Collective.
 
-        Strains are (k, v); `bonds` has the debonded nodes and first contact statuses; `starts` are first multipliers.
+        Strains are (k, v); `bonds` has debonded nodes and a first guess of contact; `starts` are initial multipliers.
 
         Raises:
             ConvergenceError: a solve broke down and left no numbers.

@@ -22,7 +22,7 @@ LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """Return the interface number (phases, phases) between two phases.
+    """Return the interface number (phases, phases) of each pair of phases.
 
     The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
     matrix, the first phase, and all other phases.
@@ -49,7 +49,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
         if unknown := [name for name in interface.between if name not in phases]:
             lines.append(f"{line}the cell has no phase {wording.toml_value(unknown[0])}; it has {', '.join(phases)}")
         elif not touching[tuple(map(phases.index, interface.between))]:
-            lines.append(f"{line}expected phases that touch; in this cell they do nowhere")
+            lines.append(f"{line}expected phases that touch; in this cell these phases do not touch")
     return lines
 
 
@@ -96,7 +96,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """Note conditions on sides, teeth of `bonds` bonds (0: unknown), and a fraction unlike the matched table's."""
+    """List remarks on sides, teeth of `bonds` bonds (0: unknown), and a fibre fraction unlike the matched table's."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -114,17 +114,17 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
         return lines
     fraction = cell.matched.fibre_fraction
     remark = (
-        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
-        "away as there, in diameters"
+        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; distances between "
+        "neighbours are the same in diameters"
     )
     return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
-    """Note springs with a strength that are too soft to stand for bonds.
+    """Note springs with a strength that are too soft to represent rigid bonds.
 
-    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness falls as E' / (k r).  At 1 / 50, the limit of
-    Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), 30 to 60 % of fibres in epoxy lose 2.5 to 10 % of C11.
+    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r).  At 1 / 50, the limit
+    of Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
     """
     lines, radii = list[str](), radii[np.isfinite(radii)]
     for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):

@@ -176,7 +176,7 @@ class _Strip:
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
         """Find the elements about the shared vertices `classes`.
 
-        Of the sides along a `cut` (c, 2), this piece counts only the sides that are `is_first`.
+        Of the sides along a `cut` (c, 2), this piece counts only those marked by `is_first`.
         """
         is_vertex, corner_vertices = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True

@@ -27,8 +27,7 @@ class CellSummary:
         phases: material phase names, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of bodies, subdomains and coarse triangles.
         interface_edge: longest coarse edge between phases.
-        numbers: (constituents,) number, from 1 as in case files, of a fibre, or of the fibre inside a coating; 0 for
-            the matrix.
+        numbers: (constituents,) fibre number from 1, as in case files; a coating has its fibre's number, the matrix 0.
         shift: (2,) distance between periodic images, `CoarseMesh.shift`.
         is_fibre: (constituents,) whether a constituent is a fibre, not the matrix or a coating.
         constituent_phase: (constituents,) index of the phase in `phases`.
@@ -126,7 +125,7 @@ def distribute(
 ) -> list[RankShare]:
     """Cut the cell, and deal the subdomains to the ranks.
 
-    Raises CaseError if an arc lies on a fibre that cannot have it, or selects no node.
+    Raises CaseError if an arc lies on a fibre that cannot have arcs, or selects no node.
     """
     torus = Torus.of(mesh)
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)

@@ -46,7 +46,7 @@ class EnergyErrors:
             spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
         shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
-        least_of_two: smallest ratio, off the diagonal, of the error to the sum of both error sizes.
+        least_of_two: least ratio, off the diagonal, of the error to the geometric mean of both |elements| + |arcs|.
     """
 
     elements: Float

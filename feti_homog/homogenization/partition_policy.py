@@ -28,7 +28,7 @@ MOST_POISSON = 0.45
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
-# Bytes of a rank without degrees of freedom, for each degree of freedom, and for each multiplier with stored columns.
+# Bytes of a rank without degrees of freedom, per degree of freedom, and per multiplier with stored influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
 # 31 000 to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, with order 2 0.85 times.
@@ -58,15 +58,15 @@ class PartitionPolicy:
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
         tiles: tiles in the coarse mesh.
-        across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body, and
+        across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body; so are
             label images of any size, whose bodies have long boundaries; 0 for no such cuts.
         across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
         whole_ranks: largest number of ranks with one piece per rank across materials; the Schur complements are
             factored together, and are too large for more ranks.
-        strip_dofs: cells from this size on are halved into strips: smaller cells have short boundaries anyway, and
-            mesh errors, estimated up to boundaries, depend less on the direction of the cuts by METIS.
+        strip_dofs: cells from this size on are halved into strips.  Smaller cells have short boundaries anyway, and
+            the irregular cuts of METIS make their estimated mesh errors depend less on the direction.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
     `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
@@ -86,7 +86,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
-        """Return the piece count across materials, a multiple of `n_ranks`; 0 for other cuts."""
+        """Return the piece count, a multiple of `n_ranks`, of a cut across materials; 0 for other cuts."""
         if not self.across_dofs or (dofs > self.across_dofs and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -102,8 +102,8 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    They may if nothing can part and the case does not prescribe the cut.  Jumps at nearly incompressible phases
-    and between very different stiffnesses need scales of single bodies; dual solver options assume single bodies.
+    They may if nothing can part and the case does not prescribe the cut.  Jumps at nearly incompressible phases and
+    between very different stiffnesses need the scaling of single bodies, which dual solver options assume, too.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
@@ -124,7 +124,7 @@ def wanted_pieces(
 ) -> Int:
     """Choose the piece count (b,) of each body.
 
-    The case or else the policy determines the numbers; each rank gets at least one piece.
+    The case, or else the policy, determines the numbers; each rank gets at least one piece.
 
     Args:
         load: (b,) coarse triangles in each body.

@@ -21,9 +21,9 @@ IN_PLANE, AXIAL_SHEAR, GRADIENT = [0, 1, 5, 2], [4, 3], [4, 3, 2]
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, in generalized plane strain, the axial problem; expansions add a temperature.
+    """Return the plane problem and, in generalized plane strain, the axial problem; or conduction alone.
 
-    Conduction is a separate problem.
+    A temperature is a load of the plane problem if all phases have expansions.
     """
     state = voigt.PLANE_STATES[case.analysis.plane]
     if not state.is_spatial or state.is_scalar:

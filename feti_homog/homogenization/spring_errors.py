@@ -92,9 +92,9 @@ class SpringSides:
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
         behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
         beyond = np.einsum("t,tci,tcj->ij", behind / (behind + front), force[tips.node], jump[tips.node])
-        # The nodal spring energy less the spring energy along this rank's sides, less the part known on arcs.  Nodes
-        # define the functions on sides in both energies; what these functions lack, the exact jump d adds to the spring
-        # energy, and to the energy of t on the distance from d to these functions.
+        # The nodal spring energy, less the spring energy of the interpolated jump along this rank's sides, less the
+        # interpolation error on arcs.  This error enters twice: in the spring energy of the exact jump, and in the work
+        # of the traction on the difference between the exact and the interpolated jump.
         side = np.flatnonzero(holds[self._nodes].all(axis=1))
         node, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
         k, moved = stiffness[node], self._in_space(jump)[node]

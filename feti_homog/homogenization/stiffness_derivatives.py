@@ -5,7 +5,7 @@ Let e_i be the strains under the unit load i, followed by the other uniform load
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
 and because the fields make C_ij stationary, dC_ij has dA and dk in place of A and k, exactly for the discrete cell.
-Bodies need only the integrals, once per phase.  A cell with contact is linear as long as no face opens or closes.
+Bodies enter only by the integrals, one per phase.  A cell with contact is linear as long as no face opens or closes.
 
 If all fibres grow, the fibre fraction f changes by d f / d ln R = 2 f, and the stiffness by the energy change on a
 moving mesh at fixed nodal u - E x: exactly for the mesh, wherever the nodes between the fibres move.

@@ -23,8 +23,8 @@ from feti_homog.typing import Float, Int
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which a mesh with two halvings less gives the error, except across materials and where a phase locks.
 REFINED_OFTEN = 3
-# Largest lambda / mu on that mesh, and in subdomains across materials, for a Poisson's ratio of 0.4: at larger ratios,
-# errors of coarse elements are no guide.
+# Largest lambda / mu on that mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
+# coarse elements lock, and their errors say little about the fine mesh.
 LOCKING = 4.0
 # Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
 NONE = -1

@@ -208,7 +208,7 @@ def tear(
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
-    del part  # the submesh of the rank takes as much memory as those of the subdomains
+    del part  # the submesh of the rank takes as much memory as the submeshes of its subdomains
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
         applications = partition_policy.applications(case, problem, summary.across)

@@ -20,7 +20,7 @@ from feti_homog.typing import Bool, Float, Int
 TIP_TOLERANCE_DEGREES = 1e-6
 # Decimals of directions in degrees for sorting and comparison: rounding must not change the order.
 DIRECTION_DIGITS = 9
-# Fibre number and direction of a tip, as from `tips` -> direction of the tip in the mesh.
+# Fibre number from 1, and direction of a tip as in `tips` -> direction of this tip in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
 NOT_MOVED: MovedTips = {}
 
@@ -100,7 +100,7 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
     """Return the tip directions in [0, 360), by fibre number from 0.
 
-    An arc without an angle takes all of `values`.  Openings of 0 and 360 degrees have no tips.
+    An arc without an angle takes every opening in `values`.  Openings of 0 and 360 degrees have no tips.
     """
     marks: dict[int, set[float]] = {}
     for arc in arcs:
@@ -162,7 +162,7 @@ def debonded(
 
 
 def _end(arc: interface_section.Arc, half: float) -> float:
-    """Return the direction in [0, 360) of an arc tip, `half` away from the arc centre."""
+    """Return the direction in [0, 360) of an arc tip, at the signed angle `half` from the arc centre."""
     return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 

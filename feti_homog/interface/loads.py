@@ -1,7 +1,7 @@
 """Loads by strains or their conjugate stresses: macroscopic states, scales of load effects, solutions.
 
-Scales for errors are sizes of load effects in the bonded cell, independent of debonding.  Under mixed loads, solutions
-under the prescribed strains and unit strains superpose at fixed active rows, with factors that meet the stresses.
+Scales for errors are sizes of load effects in the bonded cell, independent of debonding.  For mixed loads, solutions
+under the prescribed strains and under unit strains, with equal active rows, are superposed to meet the stresses.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Macroscopic:
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
-        """Return the state under the load, multiplied by `factor`."""
+        """Return the state under `factor` times the load."""
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
@@ -62,8 +62,8 @@ class Macroscopic:
     def released_to(self, after: Macroscopic) -> float:
         """Return the energy that a break releases at constant load.
 
-        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), with ' after the break; at constant strain
-        1/2 E.(Sigma - Sigma').
+        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state after the break;
+        at constant strain it is 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
 
@@ -129,8 +129,8 @@ class LoadScales:
         self.bound_ratio = float(np.linalg.eigvals(ratios).real.min())
         self.roots = np.full(len(self.mean_stiffness), np.inf)
         self.roots[:stresses] = np.sqrt(self.least_bonded_stiffness.diagonal()[:stresses])
-        # Actions other than strains cause the largest strains of free bodies: a soft body that expands hardly moves a
-        # stiff body, but the dual problem has to close its free expansion.
+        # Loads other than strains have as scale the largest strain that they cause in a free body: a soft body that
+        # expands hardly moves a stiff body, but the dual problem has to close its free expansion.
         free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
         self._strains = np.hstack([np.eye(m), np.abs(free).max(axis=0)])
         # The softer body in series with the springs: stress (k,) at bonds per cell strain.
@@ -200,7 +200,7 @@ class LoadScales:
     def acting(self, strain: Float, asked: Float) -> Float:
         """Bound the strain sizes (v,) of a state by `bound_ratio` and ABSURD times `asked`, as scales for errors.
 
-        The lower bound counts where a path with friction returns to zero stress.
+        The lower bound matters where a path with friction returns to zero stress.
         """
         sizes, m = np.abs(strain), self.solver.problem.strains
         sizes[:m] = np.clip(sizes[:m], self.bound_ratio * asked[:m], ABSURD * self.imposed_strain(asked).max())
@@ -213,7 +213,7 @@ class LoadScales:
     def imposed_strain(self, loads: Float) -> Float:
         """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell.
 
-        Loads behind the first v, which follow from them, do not count.
+        Loads after the first v follow from the first v, and do not count.
         """
         return np.asarray(self._strains @ np.abs(loads[: self._strains.shape[1]]))
 
@@ -221,7 +221,7 @@ class LoadScales:
 def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains stay zero where the stresses are noise.
+    Strains whose stresses are below the noise stay zero.
 
     Raises:
         NotCarriedError: no stiffness resists the stresses.

@@ -1,7 +1,7 @@
 """Compute the named constants of a stiffness, and describe their symbols and axes.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
-fibres, with engineering shears, in any stress unit.  Expansions (6,), strains per unit of temperature, are likewise.
+fibres, with engineering shears, in any stress unit.  Expansions (6,) are strains per unit of temperature.
 
 Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Axes 1, 2, 3 of a ply, of data sheets and
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
@@ -22,7 +22,7 @@ from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # number of directions across the fibres
 
-# Factors by which the components of a stiffness, (3, 3) or (6, 6), get the Frobenius norm of the tensor.
+# Factors for the components of a stiffness, (3, 3) or (6, 6), that make their norm the Frobenius norm of the tensor.
 _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (6, [1, 1, 1, 2, 2, 2]))}
 
 
@@ -73,7 +73,7 @@ class TransverseIsotropy:
     G_transverse: float = described("shear modulus across the fibres", records.STRESS)
     K_transverse: float = described("bulk modulus across the fibres in plane strain", records.STRESS)
     expansion_axial: float | None = described("expansion along the fibres; null if a phase gives none", PER_TEMPERATURE)
-    expansion_transverse: float | None = described("expansion across the fibres; null likewise", PER_TEMPERATURE)
+    expansion_transverse: float | None = described("expansion across the fibres; or null, too", PER_TEMPERATURE)
     deviation: float = described(
         "relative distance of the stiffness, as a fourth-order tensor, to the nearest transversely isotropic one"
     )
@@ -84,9 +84,9 @@ class TransverseModuli:
     """Range of moduli across the fibres, over 720 directions in half a turn about x3."""
 
     E_least: float = described("least Young's modulus across the fibres", records.STRESS)
-    E_largest: float = described("the largest one", records.STRESS)
+    E_largest: float = described("largest Young's modulus across the fibres", records.STRESS)
     G_least: float = described("least shear modulus in the plane across the fibres", records.STRESS)
-    G_largest: float = described("the largest one", records.STRESS)
+    G_largest: float = described("largest shear modulus in the plane across the fibres", records.STRESS)
 
 
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _along_axes(S: Array) -> dict[str, Any]:
 def about_fibres(C: Array) -> dict[str, Any]:
     """Tabulate the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
 
-    Nearest in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3, in Hill's moduli
+    The nearest one in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3: Hill's moduli
 
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
@@ -169,7 +169,7 @@ def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:
-    """Return the isotropic stiffness C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
+    """Return the isotropic stiffness (3, 3): C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
     plus, minus = bulk + shear, bulk - shear
     return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
 
@@ -289,7 +289,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names, such as `S12`, with another meaning in a ply; '' without such names."""
+    """Describe the axes of names that mean something else in a ply, such as `S12`; '' without such names."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

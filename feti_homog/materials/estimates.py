@@ -120,14 +120,14 @@ def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[s
 
 
 def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
-    """Estimate by `aligned_cylinders` in the matrix, with `equivalent_fibre` for fibres on springs."""
+    """Estimate constants by `aligned_cylinders` in the matrix, with `equivalent_fibre` for fibres on springs."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
     phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
     return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
 
 
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Put every fibre by itself into the matrix, under the mean field of the matrix, by `cylinders_in_matrix`.
+    """Estimate the constants by `cylinders_in_matrix`: every fibre alone in the matrix, under its mean field.
 
     The method allows any kinds of round fibres, also on springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
     isotropic phases: Chen, Dvorak and Benveniste 1992; springs: Benveniste 1985.
@@ -136,11 +136,11 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Fill space with similar cylinders of fibre and matrix, for one kind of fibres, also on springs.
+    """Estimate the constants of similar cylinders that fill space, for one kind of fibres, also on springs.
 
-    k, E_A, nu_A, G_A and the expansions by `cylinders_in_matrix` are exact for this arrangement; shear across the
-    fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin 1979; expansions: Rosen and Hashin 1970;
-    springs on fibres of equal radius: Hashin 1990.
+    Each cylinder is a fibre in matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and the expansions are exact for
+    this arrangement; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin
+    1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -149,7 +149,7 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate after Christensen and Lo, for one kind of fibres, also on springs.
+    """Estimate the constants after Christensen and Lo, for one kind of fibres, also on springs.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
     E_T and nu_T follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
@@ -163,13 +163,12 @@ def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Est
 
 
 def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
-    """Return the shear modulus m* of the medium that a coated fibre does not change.
+    """Return the shear modulus m* of the medium whose energy a coated fibre does not change.
 
-    Under shear across the fibre, the coated fibre stores the energy of the medium.
-
-    On a circle, u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of Muskhelishvili's potentials have
-    two harmonics, exp(-i t) and exp(3 i t).  In the medium phi has no term 1/z, as the energies are equal, and so
-    2 m* u = -F (Eshelby).  In the matrix with moduli m and k, P = F + 2 m u and kappa_m = 1 + 2 m/k,
+    Under shear across the fibre, the displacement u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of
+    Muskhelishvili's potentials have two harmonics on a circle, exp(-i t) and exp(3 i t).  As the coated fibre stores
+    the energy of the medium that it replaces, phi has no term 1/z in the medium, and so 2 m* u = -F (Eshelby).  In the
+    matrix with moduli m and k, P = F + 2 m u and kappa_m = 1 + 2 m/k,
 
         P_1 ~ 1/r,  P_3 ~ r^3,  F_1 - (3 P_3 + P_1)/(kappa_m + 1) ~ r,  F_3 - (P_3 - P_1)/(kappa_m + 1) ~ 1/r^3,
 

@@ -29,10 +29,10 @@ NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
 # Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
 ISOTROPY = 1e-9
-# Relative asymmetry of a symmetric matrix by its digits.
+# Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.
 NOISE = 1e-9
-# Beyond the first contrast the rounding of displacements costs the soft phase its allowed stress error; beyond the
-# second contrast it leaves nothing of the soft phase's stresses.
+# Beyond the first contrast, rounding of displacements may exceed the allowed stress error of the soft phase; beyond the
+# second, no digit of the soft phase's stresses is left.
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 

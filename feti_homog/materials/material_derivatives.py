@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by each given constant; in space expansions come last."""
+    """Yield the derivatives by each given constant; in space, expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -101,7 +101,7 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield the end of the key, the value and dk (3, 3) by each conductivity in the cell's axes."""
+    """Yield the last part of the key, the value and dk (3, 3) for each conductivity in the cell's axes."""
     k = material.conductivity
     if isinstance(k, material_forms.FibreConductivity):
         yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])

@@ -148,7 +148,7 @@ class General:
 
     stiffness: Matrix = key(
         MATRIX,
-        "The stiffness, symmetric and positive definite; of 6x6, 23 and 13 are coupled to each other alone.",
+        "The stiffness, symmetric and positive definite; in a 6x6 stiffness, 23 and 13 are coupled only to each other.",
         unit="stress",
     )
     expansion: float | tuple[float, ...] | None = thermal_by_axis(
@@ -227,7 +227,7 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
 
 
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
-    """Compute the utilisations (n,) of the `MODES`, not above 0 for the other sign.
+    """Compute the utilisations (n,) of the `MODES`, at most 0 where the stress has the other sign.
 
     A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """

@@ -40,13 +40,14 @@ class Bounds:
 class FibreBounds:
     """Lower and upper bounds on the constants for any arrangement of bonded fibres."""
 
-    E_axial: Pair = described("of Young's modulus along the fibres", records.STRESS, "(2,)")
+    E_axial: Pair = described("bounds on Young's modulus along the fibres", records.STRESS, "(2,)")
     nu_axial: Pair | None = described(
-        "of the contraction across the fibres under stress along them; null of more than two phases", shape="(2,)"
+        "bounds on the contraction across the fibres under stress along them; null for more than two phases",
+        shape="(2,)",
     )
-    G_axial: Pair = described("of the shear modulus along the fibres", records.STRESS, "(2,)")
-    G_transverse: Pair = described("of the shear modulus across the fibres", records.STRESS, "(2,)")
-    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", records.STRESS, "(2,)")
+    G_axial: Pair = described("bounds on the shear modulus along the fibres", records.STRESS, "(2,)")
+    G_transverse: Pair = described("bounds on the shear modulus across the fibres", records.STRESS, "(2,)")
+    K_transverse: Pair = described("bounds on the plane-strain bulk modulus across the fibres", records.STRESS, "(2,)")
 
 
 @dataclass(frozen=True)
@@ -112,8 +113,8 @@ class Estimates:
     rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
     chamis: Estimate = described("Chamis 1984")
     halpin_tsai: Estimate = described("Halpin and Tsai 1969")
-    mori_tanaka: Estimate = described("Mori and Tanaka 1973, of aligned cylinders")
-    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact of composite cylinders")
+    mori_tanaka: Estimate = described("Mori and Tanaka 1973, for aligned cylinders")
+    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact for composite cylinders")
     self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
 
 
@@ -126,7 +127,7 @@ class ConductivityEstimates:
         "bounds across bonded fibres in any arrangement: harmonic and arithmetic mean", "conductivity", "(2,)"
     )
     hashin_shtrikman: Pair | None = described(
-        "bounds across bonded fibres of a cell that conducts alike in all directions across", "conductivity", "(2,)"
+        "bounds across bonded fibres, for a cell that is isotropic in the plane", "conductivity", "(2,)"
     )
     maxwell: float | None = described(
         "estimate across round fibres: Maxwell 1873, with conductances Hasselman and Johnson 1987", "conductivity"
@@ -222,7 +223,7 @@ def aligned_cylinders(
 
 
 def expansions(phase: TransverseIsotropy) -> Pair | None:
-    """Return the axial and transverse expansions, if the phase has both."""
+    """Return the axial and transverse expansions; None unless the phase has both."""
     if phase.expansion_axial is None or phase.expansion_transverse is None:
         return None
     return phase.expansion_axial, phase.expansion_transverse

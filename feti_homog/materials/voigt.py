@@ -60,7 +60,7 @@ class PlaneState:
 
     @property
     def normals(self) -> int:
-        """The number of normal strains, the first components, that are loads."""
+        """The number of normal strains among the loads; they are the first components."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 

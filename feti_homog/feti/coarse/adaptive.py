@@ -1,12 +1,12 @@
 """The adaptive coarse space: rigid-body motions and soft subdomain modes, averaged over node copies.
 
-With the coarse displacements Z_0 (`geneo.AveragedModes`) in equilibrium, the boundary stiffness S becomes
+After elimination of the coarse displacements Z_0 (`geneo.AveragedModes`), the boundary stiffness S becomes
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
 and the preconditioner is H_0 = B_D S_0 B_D^T.  As B Z_0 = 0, H_0 is the exact inverse of the dual operator if Z_0 spans
-all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes the soft modes from the Krylov
-method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite, coupling neighbours of a subdomain.
+all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes them from the Krylov method
+(Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite; it couples all neighbours of a subdomain.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class AdaptiveCoarseSpace:
 
     Attributes:
         threshold: bound tau of soft modes.
-        counts: numbers of soft modes by local subdomain.
-        coarse_dimension: number n of all coarse displacements.
+        counts: number of soft modes of each local subdomain.
+        coarse_dimension: number n of coarse displacements in the cell.
         factorizations: number of factorizations of Z_0^T S Z_0.
         solver: solver for the scaled matrix Z_0^T S Z_0.
     """
@@ -86,7 +86,7 @@ class AdaptiveCoarseSpace:
     def activate(self, active: Float) -> None:
         """Average the modes over node copies on active rows, and factor again.  Collective.
 
-        Rows are active where `active` (owned rows,) is 1; the scaling must have the same rows.  Raises as `factor`.
+        Rows are active where `active` (owned rows,) is 1; the scaling has the same active rows.  Raises as `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
@@ -113,8 +113,8 @@ class AdaptiveCoarseSpace:
         """Factor the coarse matrix Z_0^T S Z_0 of all ranks.  Collective.
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
-        have no energy and get no equation; other modes may be linearly dependent.  A multiple eps I makes the matrix
-        definite: for a coarse displacement with scaled energy mu, S_0 keeps eps / (mu + eps) of the forces.
+        have no energy and get no equation; other modes may be linearly dependent.  Adding eps I makes the matrix
+        definite; from forces of a coarse displacement with scaled energy mu, S_0 then keeps eps / (mu + eps).
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
@@ -128,7 +128,7 @@ class AdaptiveCoarseSpace:
         energy = distributed_arrays.allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            # The energy of displacements that are rounding is quadratic in the rounding.
+            # Displacements that are pure rounding have an energy quadratic in the rounding.
             rounded = (ROUNDING_MARGIN * np.finfo(float).eps) ** 2 * largest
             self._free_energy = ZERO_TOLERANCE * np.where(energy > rounded, energy, largest)
         # The energy of a free motion is rounding, which the scaling would raise above eps.

@@ -1,15 +1,15 @@
 """Face neighbourhoods of large bodies, and trace spaces of piecewise linear displacements.
 
-For face displacements p, the body has at least the energy of the face neighbourhood N:
+For given face displacements p, the body stores at least as much energy as the face neighbourhood N:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
-So every soft displacement of the body is soft in a neighbourhood, which may have additional soft displacements.  With
-all nodes off the face fixed, the face is stiffer than in the body: S restricted to the face <= S_fixed.
+So every soft displacement of the body is soft in the neighbourhood too; the converse need not hold.  Fixing the other
+faces and all nodes outside the neighbourhood stiffens the face: S restricted to the face <= S_fixed.
 
 Refinement hardly changes the soft modes of a subdomain.  So the search uses the coarsest trace space with enough dofs:
-P q for the values q at the vertices of the coarse mesh and at every k-th node along its edges; without nodes on edges,
-at every second vertex.
+displacements P q, interpolated from values q at the coarse vertices and at every k-th node along coarse edges; where
+edges have no nodes inside, from every second coarse vertex.
 """
 
 from dataclasses import dataclass
@@ -31,10 +31,10 @@ from feti_homog.typing import Float, Int
 def trace_space(
     submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
-    """Build the prolongation P (cn, cm) from a trace space to boundary nodes.
+    """Build the prolongation P (c n, c m) from m to n boundary nodes.
 
-    `nodes` (n,) are sorted node classes of the refined piece, with c components; cm >= min(cn, `min_dofs`).  Edge ends
-    that are not boundary nodes have zero displacement.
+    `nodes` (n,) are sorted node classes of the refined piece, with c components; c m >= min(c n, `min_dofs`).  Edge
+    ends that are not boundary nodes have zero displacement.
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     if not inner:

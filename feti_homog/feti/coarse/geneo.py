@@ -4,8 +4,8 @@ With the soft modes in the coarse space, the largest eigenvalue of the precondit
 1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain (GenEO:
 Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
 
-Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  B Z_0 = 0, because B B_D^T = I: so Z_0 are
-displacements of the cell with glued active rows.  A subdomain mode reaches the subdomain and its neighbours alone.
+Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  As B B_D^T = I, B Z_0 = 0: Z_0 are displacements
+of the cell with glued active rows.  A mode reaches (is nonzero on) only its subdomain and the subdomain's neighbours.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,8 +23,8 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
 from feti_homog.typing import Float, Float32, Int
 
-# Jumps B V from the modes of one subdomain, on rows of the same or a neighbour subdomain: row positions (r,), coarse
-# mode numbers (c,), and values (r, c).
+# Jumps B V that the modes of one subdomain cause on its rows, or on rows shared with a neighbour: row positions (r,),
+# coarse mode numbers (c,), and values (r, c).
 Jumps = tuple[Int, Int, Float]
 
 
@@ -71,7 +71,7 @@ class AveragedModes:
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
         """Compute the averaged modes Z_0 (boundary dofs, m) on local subdomain i.
 
-        The kernel of the subdomain, which has no energy, is left out: so motions of stiff subdomains keep all digits.
+        The kernel of subdomain i has no energy and is left out, so that motions of stiff subdomains keep all digits.
 
         Args:
             BW: (rows, boundary dofs) scaled constraints W^-1 B D^-1 of the subdomain, on the active rows.
@@ -126,7 +126,7 @@ def kernels_and_soft_modes(
 ) -> list[Float]:
     """Compute the modes V (n, k + m) of every local subdomain.  Collective.
 
-    A subdomain has k kernel modes and m soft modes with theta < `threshold`.
+    On its n boundary dofs, a subdomain has k kernel modes, followed by m soft modes with theta < `threshold`.
 
     Raises:
         MeshError: a face neighbourhood on some rank is not a valid subdomain.
@@ -154,7 +154,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Return the columns `span` of a matrix, at sorted `rows` that contain all their entries."""
+    """Cut the columns `span` out of a matrix; all their nonzeros are in sorted `rows`."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

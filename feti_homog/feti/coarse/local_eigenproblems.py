@@ -4,10 +4,10 @@ For a subdomain s with Schur complement S_s and constraints B_s, boundary displa
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
-are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem is too large.  But if every
-node belongs to one other body only, the weights of M^-1 hardly change along the boundary, s contributes at most S_s to
-M^-1, and the contribution of the neighbour makes p stiff.  Then every face has a separate eigenproblem, with the Schur
-complement of the face neighbourhood in place of S_s.  All eigenproblems are projected to trace spaces.
+are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem costs too much.  But if
+every node belongs to one other body only, the weights of M^-1 hardly change along the boundary: s contributes at most
+S_s to M^-1, and it is the neighbour's contribution that makes p stiff.  Then every face has a separate eigenproblem,
+with the Schur complement of the face neighbourhood instead of S_s.  All eigenproblems are projected to trace spaces.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ class SubdomainBlocks:
     Attributes:
         subdomain: the subdomain.
         dofs: (n,) boundary degrees of freedom.
-        operator: boundary operators.
+        operator: S and S+ of the subdomain with its springs.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
         facewise: whether every face has a separate eigenproblem.
@@ -60,7 +60,7 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Find the trace space and the part of M^-1; `common` is as in `Neighbours.common`."""
+        """Build the trace space and the subdomain's part of M^-1; `common` is an item of `Neighbours.common`."""
         self.block, self.common, self._operator, subdomain = block, common, operator, block.subdomain
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
@@ -69,15 +69,15 @@ class SubdomainEigenproblem:
         self._share = BW @ (BW @ operator.S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield neighbours t and the part (r, r) of this subdomain in M^-1 on r common rows."""
+        """Yield each neighbour, and this subdomain's part (r, r) of M^-1 on their r common rows."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute soft modes (n, m), theta < `threshold`; `shares` are neighbours and their parts of M^-1."""
+        """Compute soft modes (n, m) with theta < `threshold`; `shares` are neighbours and their parts of M^-1."""
         M = self._share.copy()
-        # Subdomain order, so that rounding does not depend on the ranks.
+        # Add in the order of subdomains, so that rounding does not depend on the ranks.
         for s, share in sorted(shares, key=lambda part: part[0]):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
@@ -101,7 +101,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield neighbours t and an upper bound (r, r) of this subdomain in M^-1 on r common rows."""
+        """Yield each neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r common rows."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:

@@ -25,13 +25,13 @@ class NaturalCoarseSpace:
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
-        owned_modes: slice in all modes with the modes of local subdomains.
+        owned_modes: modes of the local subdomains, as a slice of all modes.
         R: (boundary dofs, owned modes) kernels on the boundaries.
-        G: (owned rows, m).
+        G: (owned rows, m) jumps of the modes.
         body: (m,) body numbers of the modes.
         pinned_body: body with the pinned node class, or one of several; -1 without a pinned class.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) owned modes, and modes in the owned rows of G or in local unconstrained modes.
+        unknowns: (u,) numbers of owned modes, and of modes in owned rows of G or in local unconstrained modes.
         factorizations: number of factorizations of G^T G.
         solver: solver for G^T G.
     """
@@ -97,7 +97,7 @@ class NaturalCoarseSpace:
     def _gram(self) -> GramMatrix:
         """Return the matrix G^T A G; it stores 36 products per row.  The first call is collective.
 
-        The pieces of the pinned body are glued to the pinned class and cannot move.
+        Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
@@ -115,9 +115,9 @@ class NaturalCoarseSpace:
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def balancing(self, forces: Float) -> Float:
-        """Compute G (G^T G)^-1 e (owned rows, k): least multipliers of active rows with G^T lam = e.  Collective.
+        """Compute G (G^T G)^-1 e (owned rows, k): the least-norm lam with G^T lam = e.  Collective.
 
-        `forces` (owned modes, k) are the rows of e of local subdomains.
+        `forces` (owned modes, k) are the rows of e for local subdomains; lam is 0 on inactive rows.
         """
         if not self._is_factored:
             self.factor()
@@ -143,7 +143,7 @@ class GramMatrix:
     """The matrix G^T A G for active rows A = diag(a) that change, summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Multiply all pairs of entries in a row of G, and group the `movable` modes.  Collective."""
+        """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # Pairs of entries of one row.
@@ -160,8 +160,8 @@ class GramMatrix:
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
         self._rows, self._columns = np.divmod(self._keys, self._m)
-        # Modes that G^T G couples have a common eigenproblem, about as large as the kernel of a fibre.  The tuples are
-        # modes (groups, size), positions of the blocks in the entries, and the blocks, eigenvalues and eigenvectors in
+        # Modes that G^T G couples have a common eigenproblem, about as large as the kernel of a fibre.  A tuple has
+        # modes (groups, size), positions of the blocks in the entries, and blocks, eigenvalues and eigenvectors from
         # the last call of `null_space`.
         self._groups: list[tuple[Int, Int, Float, Float, Float]] = []
         for members in self.groups(movable):
@@ -218,7 +218,7 @@ class GramMatrix:
         return [modes[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """Return the numbers (g, s, s) of the entries at all mode pairs in groups `members` (g, s).
+        """Look up the entry numbers (g, s, s) of all mode pairs in groups `members` (g, s).
 
         A pair without an entry gets the total number of entries.
         """

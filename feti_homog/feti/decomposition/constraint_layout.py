@@ -60,7 +60,7 @@ class ConstraintLayout:
         rows: (local rows,) global row numbers.
         dofs: (subdomains + 1,) first local dof by subdomain, and the number of all dofs.
         owned: half-open range of the global rows that this rank owns.
-        base: (sharers,) local number of the first fine node of a sharer on its entity; -1 on another rank.
+        base: (sharers,) local number of the sharer's first fine node on the entity; -1 for sharers on other ranks.
     """
 
     def __init__(
@@ -95,8 +95,8 @@ class ConstraintLayout:
         component, identity = np.arange(c), np.eye(c)
         none = np.zeros(0, np.int64)
         rows, columns, values = [none], [none], [none.astype(float)]
-        # Entities have one code, and form one group, if their bodies have equal numbers of copies and their bonds can
-        # or cannot break: bits mark the first copy of every body, the end of the copies, and breakable bonds.
+        # Entities with equal codes form a group: their bodies have equal numbers of copies, and their bonds all can or
+        # all cannot break.  Bits mark the first copy of every body, the end of the copies, and breakable bonds.
         entity, copy = expand(np.arange(len(shared.key)), shared.copies)
         codes = np.zeros((len(shared.key), shared.copies.max(initial=0) + 2), bool)
         codes[entity, copy] = (copy == 0) | (np.diff(shared.body, prepend=-1) != 0)
@@ -175,7 +175,7 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """Count the node copies in both bodies of every row, and return the inner body.
+        """Count the node copies in the outer and the inner body of every row.
 
         Returns:
             (local rows, 2) copies in the outer and the inner body, and (local rows,) number of the inner body; rows
@@ -210,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """Return the entity and the position p on the entity for every fine node; `nodes` (e,) counts them."""
+    """List the entity of every fine node, and its position p there; `nodes` (e,) are counts."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

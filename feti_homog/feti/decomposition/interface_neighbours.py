@@ -105,7 +105,7 @@ class InterfaceNeighbours:
             for body, body_codes in zip(bodies.T, codes, strict=True):
                 low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
                 body_codes.append(_once(low * n + high))
-        # A side on an interface occurs once in either body; twice within a body that METIS cuts; never in a void.
+        # A side on an interface occurs once in each body, twice within a body that METIS cuts, never in a void.
         outer, inner = (_once(np.concatenate(comm.allgather(np.concatenate(body_codes)))) for body_codes in codes)
         a, b = np.divmod(np.intersect1d(outer, inner), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
@@ -120,7 +120,7 @@ class InterfaceNeighbours:
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
         """Extend global rows (k,) by rows of adjacent nodes, until there are `enough` rows.
 
-        `choose` filters the candidates; the search goes from neighbour to neighbour, up to the ends.
+        `choose` filters the candidates.  The search goes from neighbour to neighbour, up to the ends of interfaces.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:
@@ -132,7 +132,7 @@ class InterfaceNeighbours:
             bonds = extended
 
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
-        """Return the interface node number (local fine nodes,) of every local fine node, or -1."""
+        """Look up the interface node number (local fine nodes,) of every local fine node; -1 for others."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))

@@ -56,7 +56,7 @@ class JumpOperator:
         comm: communicator of all ranks.
         problem: components of the displacement, and unit loads, also for ranks without subdomains.
         components: number of rows of a vector constraint.
-        B: (local rows, local dofs) signed and rotated entries; the local rows have an entry at a local dof.
+        B: (local rows, local dofs) signed and rotated entries; local rows are all rows with an entry at a local dof.
         rows: (local rows,) global row numbers.
         node_rows: as `ConstraintLayout.node_rows`.
         shared_dofs: number of displacements at nodes that subdomains share, on all ranks.
@@ -108,9 +108,9 @@ class JumpOperator:
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
-        """Send numbers of outer node copies to the owners of interface nodes: (k,).  Collective.
+        """Send the numbers of outer node copies to the owners of interface nodes.  Collective.
 
-        Every rank passes `numbers` of all its fine nodes.
+        Every rank passes `numbers` of all its fine nodes, and receives the numbers (k,) at its interface nodes.
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
@@ -128,7 +128,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """The PETSc scatter between owned and local rows for k columns; does nothing where they are equal."""
+    """The PETSc scatter between owned and local rows for k columns; without effect if both are equal."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))
@@ -195,7 +195,7 @@ class NodeBlocks:
             self.blocks.append((starts[chosen][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """Invert the block of rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
+        """Invert the blocks on rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

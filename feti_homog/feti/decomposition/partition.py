@@ -37,7 +37,7 @@ def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
     The strips run along x or y, have about half of the triangles (within STRIP_SLACK), and their boundaries have as few
-    edges as possible; boundaries of two METIS parts on the torus are up to 50 % longer.  None if a strip falls apart.
+    edges as possible; boundaries of two METIS parts are up to 50 % longer.  Returns None if a strip is not connected.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -59,7 +59,7 @@ def halves(torus: Torus) -> Partition | None:
     connected = periodic_topology.components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
-    piece ^= ~np.isin(connected, main)  # islands go to the strip around
+    piece ^= ~np.isin(connected, main)  # islands go to the strip around them
     together = piece[tail] == piece[head]
     is_whole = periodic_topology.components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
@@ -120,7 +120,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) for pieces of about `max_dofs` dofs, for bodies with `load` (b,) triangles."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs a piece."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -131,7 +131,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Compute the part (n,) of every vertex by METIS, with even `load` (n,) or vertex counts and a small edge cut."""
+    """Divide a graph by METIS into parts (n,) with even `load` (n,), or vertex counts, and a small edge cut."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)
@@ -141,8 +141,8 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     """Assign subdomains with `load` (s,) triangles to ranks: (s,).
 
-    METIS puts neighbours (left, right), one pair for every shared edge, on the same rank, if the largest load is at
-    most MAX_IMBALANCE times the largest of balanced loads.  With more ranks than subdomains, some ranks stay empty.
+    METIS keeps neighbours (left, right), one pair for every shared edge, on the same rank.  If its largest load exceeds
+    the largest balanced load by MAX_IMBALANCE, only loads decide.  Ranks stay empty if subdomains are too few.
     """
     by_load = distributed_arrays.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

@@ -124,7 +124,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
     """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
-    Edges (p,) contribute `parts` (p, 2, k) to the vertex classes at their `ends` (p, 2): entities, or the pinned class.
+    Edges (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), which are entities or the pinned class.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]
@@ -133,7 +133,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
     code, at, parts = distributed_arrays.exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
-    # The order of edges is the same on any number of ranks, because rounding depends on it.
+    # Rounding depends on the order of edges, which is therefore the same on any number of ranks.
     sequence = np.lexsort(at.T)
     np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
@@ -170,8 +170,8 @@ class SharedEntities(Sharers):
         body: (sharers,) body of a sharer.
         fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
         pair: (n,) case interface between both bodies; -1 where no bond can break.
-        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, with the length |dx / ds|
-            for s in [0, 1]; at a vertex, with the tributary length of the vertex.
+        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for
+            s in [0, 1]; at a vertex, of the vertex's tributary length.
         turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: half-open range of the vector constraints that this rank owns.
@@ -191,7 +191,7 @@ class SharedEntities(Sharers):
 
     @property
     def pieces(self) -> set[int]:
-        """Return the subdomains with a node in another piece of their body, or in several other bodies."""
+        """Return the subdomains that share a node with a piece of their own body, or with several bodies."""
         body = self.body
         between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
         return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())

@@ -1,8 +1,8 @@
 """Search for the subdomains that share coarse vertices and edges, by all ranks together.
 
-A vertex or edge has a key, and a home rank: key modulo ranks.  Every rank sends its keys that other subdomains may
-have, with their subdomains, to the home ranks.  A home rank sorts the subdomains of a key, and sends the list to all
-ranks with one of these subdomains.
+A vertex or edge has a key, and a home rank: key modulo ranks.  Every rank sends the keys that several subdomains may
+share to the home ranks, with the rank's own subdomains at each key.  A home rank sorts all subdomains of a key, and
+sends the list to every rank with one of these subdomains.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class Sharers:
 
     @property
     def copies(self) -> Int:
-        """Return the number (n,) of sharers of an entity."""
+        """Return the number (n,) of sharers of every entity."""
         return np.diff(self.pointer)
 
     @property
     def innermost(self) -> Int:
-        """Return the last sharer (n,) of an entity."""
+        """Return the last sharer (n,) of every entity."""
         return np.asarray(self.sharer[self.pointer[1:] - 1])
 
     @property
@@ -68,7 +68,7 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     at_border = np.zeros(len(mesh.class_keys), bool)
     at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
     corner = np.where(np.isin(corner, mesh.pinned), -1, corner)
-    # Unique pairs of an entity that other ranks may have, as a code, and a local subdomain.
+    # Unique pairs: the code of an entity that subdomains may share, and a local subdomain at the entity.
     vertices, edges = _several(corner, meshes.member, at_border), _several(side, meshes.member, one_sided)
     kinds = (False, mesh.class_keys, *vertices), (True, mesh.edge_keys, *edges)
     pairs = [(entity_code(keys[i], is_edge), meshes.index[member]) for is_edge, keys, i, member in kinds]

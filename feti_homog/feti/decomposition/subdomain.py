@@ -29,10 +29,10 @@ class Subdomain:
         laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
         Q: (cn, v) unit loads: f = -Q E; with given tractions on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
-        areas: (materials,) area of a material.
+        areas: (materials,) area of every material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
-            without the motions that held classes stop.
-        held: classes that do not move: pinned ones, and those between on sides that move by E x.
+            without the motions that held classes prevent.
+        held: classes with u* = 0: pinned classes, and the nodes on sides that move by E x.
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
         is_outer: whether no other body lies around the body.
@@ -148,7 +148,7 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L, 0 for tractions on sides, in the shape of Q^T Q."""
+        """Return |Omega| L (v + m, v + m), padded with 0 for the m tractions on sides."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C
@@ -237,7 +237,7 @@ class Subdomain:
             apart.append(np.argmax(((x - x[apart[0]]) ** 2).sum(axis=1)))
             (dx, dy), (ex, ey) = x[apart[1]] - x[apart[0]], (x - x[apart[0]]).T
             apart.append(np.argmax(np.abs(dx * ey - dy * ex)))
-        # On a straight line two nodes are enough, and the third is a copy.
+        # On a straight line two nodes are enough, and the third repeats one of them.
         nodes = np.unique(candidates[apart])
         dofs = self.problem.dofs(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
@@ -267,7 +267,7 @@ def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Floa
 
 
 def label(submesh: Submesh) -> str:
-    """Return the name of a subdomain in messages."""
+    """Name a subdomain in messages by number, phase and a point."""
     x, y = submesh.points[0] + submesh.origin
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"

@@ -5,8 +5,8 @@ since: their bonds broke, closed or softened.  `followed_response` updates the c
 every change.  With these columns, `reference_changes` turns any response of the reference cell into the present one.
 
 When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
-factored as the new reference cell.  Where an update would lose too many digits, the cell is factored too, and columns
-are followed from its response.
+factored as the new reference cell.  The cell is factored too where an update would lose too many digits; columns are
+then followed from the new response.
 """
 
 import numpy as np
@@ -33,9 +33,9 @@ class ExactInverse(Preconditioner):
         stiffness: (all rows,) upper bounds for the diagonal of H: both nodes and their spring in series, while all
             other nodes are fixed.
         norm: upper bound of |H|.
-        factorizations: number of reference cells so far.
+        factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns from which unused columns are dropped; read at the next restart.
+        most_followed: number of columns above which unused columns are dropped; takes effect at the next restart.
     """
 
     is_exact = True
@@ -84,7 +84,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update to the next state; return False if a pivot is below `pivot`.  Collective."""
+        """Update followed columns to the next state; return False if a pivot is below `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -109,7 +109,7 @@ class ExactInverse(Preconditioner):
         self._is_fresh = True
 
     def _factor(self, active: Float) -> None:
-        """Factor the reference cell with the bonds `active`, which must stop all bodies.  Collective."""
+        """Factor the reference cell with the bonds `active`, which must hold all bodies.  Collective."""
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
             process.trim_memory()
@@ -124,7 +124,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def _rows_with_pins(self) -> Float:
-        """Return 1 on active rows and on pins, else 0 (owned rows,)."""
+        """Return 1 on active rows and on pins (see `followed_response`), else 0: (owned rows,)."""
         holds, pins = self._active.copy(), self._followed.pins - self._first
         holds[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
         return holds
@@ -173,7 +173,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return the `rows` without columns, and active rows without columns beside them.  Collective.
+        """Return the `rows` without columns, and neighbouring active rows without columns.  Collective.
 
         Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
         """
@@ -183,7 +183,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def _are_active(self) -> Bool:
-        """Return whether rows are active (all rows,).  Collective."""
+        """Return whether each row of the cell is active: (all rows,).  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
@@ -214,8 +214,8 @@ class ExactInverse(Preconditioner):
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
-        Both are updated from state to state; arguments as in `multipliers`.  Jumps hold for one position of free
-        bodies.  Returns None if the number of free motions in the columns differs from `free`.
+        Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
+        positions.  Returns None if the number of free motions in the columns differs from `free`.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -227,7 +227,7 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
+        """Compute the answer U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
         `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
         updates, and replaces the stored U.
@@ -243,7 +243,7 @@ class ExactInverse(Preconditioner):
     def inverse_blocks(self, pairs: Int) -> Float:
         """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs of active global rows.  Rows i that open together part by H_ii^-1 lam_i.
+        All ranks pass the same pairs of active global rows.  If both rows i of a pair open, they part by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)

@@ -1,4 +1,4 @@
-"""The answer U to unit loads and columns of the response Gamma, updated while bonds soften, break and close.
+"""The answer U to the unit loads, and columns of the response Gamma, updated as bonds soften, break and close.
 
 U has multipliers on active rows and jumps on inactive rows, under the unit loads.  Gamma maps jumps on active rows and
 forces on inactive rows to multipliers and jumps.  U and Gamma are principal pivot transforms.  If springs on the
@@ -11,8 +11,8 @@ If the rows I become inactive (s = 1) or active (s = -1), B = Gamma_II^-1 and
     U_I <- s B U_I,  Gamma_I: <- s B Gamma_I:,  Gamma_:I <- Gamma_:I B s,  Gamma_II <- -s B s,
 
 with the other entries as above.  Springs of inactive rows have the initial compliance C_0: Gamma_II loses the gain of
-a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs the columns of I
-alone; changes of the other stored columns wait until there are WAITING_COLUMNS.
+a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs only the columns of
+I; changes of the other stored columns are collected, and applied when there are WAITING_COLUMNS of them.
 
 A row that becomes inactive and alone resisted a motion of a body becomes a pin.  A pin stays among the active rows
 with multiplier and jump 0, which fixes one of the possible positions of the body, until a row becomes active that
@@ -35,7 +35,7 @@ class FollowedResponse:
 
     Attributes:
         answer: (owned rows, v) U.
-        pins: (p,) global rows of pins, which stop bodies that no active row stops.
+        pins: (p,) global rows of pins, which hold bodies that no active row holds.
         had_pins: whether a body has been free; U then loses digits with every change of that body's few faces.
     """
 
@@ -49,7 +49,7 @@ class FollowedResponse:
         self.answer, self.pins, self.had_pins = answer, np.zeros(0, np.int64), False
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
-        # The change at which every column was last used, and the present change.
+        # Number of the change at which every column was last used, and number of the present change.
         self._used, self._now = np.zeros(capacity, np.int64), 0
         # The system provides this memory only when columns are written.
         self._buffer = np.zeros((len(answer), capacity), order="F")
@@ -70,7 +70,7 @@ class FollowedResponse:
         capacity = len(self._used)
         if len(self._rows) + more <= capacity:
             return
-        # More columns than necessary are dropped, because the remaining columns move.
+        # The remaining columns move, which costs time: so more columns than necessary are dropped at once.
         count = max(min(int(thresholds.FOLLOWED_SHARE * capacity), capacity - more), 0)
         is_needed, is_useful = np.isin(self._rows, needed), useful[self._rows]
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~is_needed])
@@ -159,7 +159,7 @@ class FollowedResponse:
         return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update for springs of active rows (k,) that gain compliance `more` (k,); False as `follow`.  Collective."""
+        """Update U and columns for springs (k,) that gain compliance `more` (k,); return as `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -172,9 +172,9 @@ class FollowedResponse:
         return B is not None
 
     def _turn(self, rows: Int, sign: Float, gain: Float, pivot: float) -> bool:
-        """Update for rows that become inactive (sign 1) or active (-1); False as `follow`.  Collective.
+        """Update U and columns for rows that become inactive (sign 1) or active (-1).  Collective.
 
-        Pins on which a new active row exerts a force become inactive.
+        Arguments and result are as in `follow`.  Pins on which a new active row exerts a force become inactive.
         """
         columns, values = self._present(rows)
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
@@ -218,7 +218,7 @@ class FollowedResponse:
     def _present(self, rows: Int) -> tuple[Float, Float]:
         """Return columns (owned rows, k) at global rows (k,), and entries of all ranks.  Collective.
 
-        The entries are rows I, then rows with columns, of these columns and U: (k + all columns, k + v).
+        The entries of these columns and of U (k + all columns, k + v) are at `rows`, then at all rows with columns.
         """
         self._now += 1
         self._used[self._slot[rows]] = self._now
@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B (Gamma_I:, U_I) from U at once, from the columns later; `values` as `_present`."""
+        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `values` as from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
@@ -249,10 +249,10 @@ class FollowedResponse:
 
 
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
-    """Invert `block` (k, k) on the rows that can turn; return their positions and the inverse.
+    """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
 
-    All rows can turn that become active (sign -1), and rows that become inactive (1) as long as no body becomes free.
-    The result is None if a scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1), and inactive (1) as long as no body becomes free.  The result is None if a
+    scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))

@@ -41,8 +41,8 @@ class AssembledSchur:
     def __init__(self, operators: InterfaceOperators, active: Float) -> None:
         """Assemble and factor Z^T S Z.  Collective.
 
-        Rows with `active` (owned rows,) 1 must leave no rigid-body motion free.  LAPACK factors dense matrices; options
-        for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+        Rows where `active` (owned rows,) is 1 must leave no rigid-body motion free.  LAPACK factors dense matrices;
+        options for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
 
         Raises:
             TypeError: a boundary operator is not dense.
@@ -121,7 +121,7 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
 
 
 class BodyTies:
-    """Two bonds that tie every fibre to the body around it; the second is the farthest from the first."""
+    """Two bonds that tie every fibre to the body around it: its first bond, and the bond farthest from it."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the two bonds of every pair of bodies.  Collective."""
@@ -231,10 +231,10 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs) with B B_D^T = I, by motions of one body.  Collective.
+    """Build B_D (local rows, boundary dofs) with B B_D^T = I, moving one body per bond.  Collective.
 
-    Only the body that moves needs forces: the inner body, unless it is more than STIFF_FIBRES times as stiff as the
-    outer body, because its forces would lose digits.
+    Only the moved body needs forces.  It is the inner body, unless the inner body is more than STIFF_FIBRES times as
+    stiff as the outer body, so that its forces would lose digits.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
@@ -277,7 +277,7 @@ class BondedInverse(Preconditioner):
         self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:
-        """Factor the cell if `active` (owned rows,) has changed; active rows must stop all bodies.  Collective."""
+        """Factor the cell if `active` (owned rows,) has changed; active rows must hold all bodies.  Collective."""
         if self._operators.comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
             self._cell.destroy()
             self._cell = ReferenceCell(self._operators, self._one_sided, active)

@@ -178,7 +178,7 @@ class DenseSolver:
     """A solver X = A^-1 B for one SPD matrix A (n, n), by LAPACK."""
 
     def __init__(self, A: Float) -> None:
-        """Factor A as `cholesky`; a matrix in Fortran order is overwritten."""
+        """Factor A by `cholesky`; a matrix in Fortran order is overwritten."""
         self._L = cholesky(A, clean=False)
 
     def solve(self, B: Float) -> Float:

@@ -1,7 +1,7 @@
 """Partial Cholesky factorizations by the CHOLMOD library of PETSc, which has no interface for them.
 
 MUMPS orders the eliminated rows without regard to the remaining rows, and is slower if many rows remain.  CHOLMOD
-accepts an order of all rows.  The structures below follow the manual of CHOLMOD, and are equal in KNOWN_VERSIONS.
+accepts an order of all rows.  The structures below follow CHOLMOD's manual, and are the same in KNOWN_VERSIONS.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.typing import Array, Float, Int
 
-# Bytes for `cholmod_common`, which takes less than 4 KiB; this module reads no member.
+# Bytes for the structure `cholmod_common`, which takes less than 4 KiB; this module reads none of its members.
 COMMON_BYTES = 2**16
 GIVEN, LOWER = 1, -1  # CHOLMOD_GIVEN: the caller orders the rows; stype: the lower triangle is stored
 KNOWN_VERSIONS = range(2, 6)

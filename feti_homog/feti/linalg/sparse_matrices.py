@@ -16,10 +16,10 @@ from feti_homog.typing import Bool, Float, Int, Int32
 def sum_of_blocks(
     shape: tuple[int, int], blocks: Iterable[tuple[Int, Int, Float]], max_buffered_entries: int = MAX_BUFFERED_ENTRIES
 ) -> csr_matrix:
-    """Sum dense blocks (rows (r,), columns (c,), values (r, c)) to a sparse matrix of a `shape`.
+    """Sum dense blocks (rows (r,), columns (c,), values (r, c)) into a sparse matrix.
 
-    Blocks wait in a buffer until it has more entries than `max_buffered_entries` and than the sum.  So the memory is at
-    most about twice the sum, and a copy of the sum happens only after its entries have doubled.
+    A buffer collects blocks until it has more entries than `max_buffered_entries` and than the sum.  So the memory is
+    at most about twice the sum, and the sum is copied only when its entries have doubled.
     """
     total, buffer, buffered_entries = csr_matrix(shape), [], 0
     for rows, columns, values in blocks:
@@ -32,7 +32,7 @@ def sum_of_blocks(
 
 
 def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
-    """Add buffered blocks, each as rows, entry counts of the rows, columns and values, to `total`."""
+    """Add buffered blocks to `total`; a block has rows, entry counts of the rows, columns and values."""
     rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
     m, n = total.shape
     # A product adds faster than a conversion from coordinates, which sorts.
@@ -142,7 +142,7 @@ def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, o
 
 
 class DistributedSolver:
-    """A solver X = A^-1 B for definite matrices A (n, n), sums over ranks.
+    """A solver X = A^-1 B for definite matrices A (n, n) that are summed over ranks.
 
     Up to n = REPLICATED_UNKNOWNS, every rank factors the whole matrix, by CHOLMOD; above, all ranks factor the matrix
     together, by MUMPS.  Options with the prefix replace these solvers; with `ksp_type` or `pc_type` all ranks solve
@@ -158,7 +158,7 @@ class DistributedSolver:
         self.is_distributed = comm.size > 1 and together
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
-        """Sum and factor A, and free the last factor.  Collective.
+        """Sum and factor A, and free the previous factor.  Collective.
 
         Args:
             unknowns: (u,) global numbers of the local unknowns, ascending; ranks may have unknowns in common.

@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node belongs to a single other body.
-        has_springs: whether the inner body of springs: its stiffness with springs is a dense matrix.
+        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ is then dense.
     """
 
     dofs: int
@@ -55,12 +55,12 @@ def choose(
 ) -> tuple[list[bool], list[bool]]:
     """Choose the boundary operators of every subdomain.
 
-    Returns `explicit`, whether they are dense matrices, not sparse factorizations, and `facewise`, whether soft modes
-    are computed face by face, by subdomain.
+    Returns two flags for every subdomain: `explicit`, dense matrices instead of sparse factors, and `facewise`, soft
+    modes computed face by face.
 
-    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs` and a reason holds: their inverse takes no
-    longer than all products by sparse factors, DENSE_INVERSE_COST n^3 <= dofs x applications; or springs; or soft modes
-    of the whole boundary.  Whole bodies without springs and n > `whole_boundary_dofs` get soft modes face by face.
+    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs`, and if their inverse takes no longer than
+    all products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), or it has springs, or soft modes
+    need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
 
     Args:
         sizes: sizes of the subdomains; the result has the same order.
@@ -242,12 +242,12 @@ class InterfaceOperators:
         return one_subdomain.CondensedLoads(boundary, stiffness, energy)
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
-        """Extend boundary displacements x (n_s, k) into one subdomain: (dofs, k).
+        """Extend boundary displacements x (n_s, k) to all dofs of one subdomain: (dofs, k).
 
         Args:
             place: position of the subdomain.
             loads: (v, k) unit loads that act inside, if any.
-            keep: whether to store the interior that this call factors because the subdomain has no factor.
+            keep: whether to store the interior, if this call has to factor it.
         """
         operator, s = self.operators[place], self.subdomains[place]
         if isinstance(operator, one_subdomain.ExplicitInterfaceOperator) and operator.factor is not None:

@@ -36,7 +36,7 @@ class ExplicitInterfaceOperator:
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
         """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), which are ascending.
 
-        Options have the prefix `feti_schur_`.  `keep_factor` keeps the factor, if CHOLMOD condenses loads inside.
+        Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
@@ -185,7 +185,7 @@ class ImplicitInterfaceOperator:
 
     @cached_property
     def condensed(self) -> CondensedLoads:
-        """Condense the unit loads to the boundary; loads inside need the interior."""
+        """Return the unit loads condensed to the boundary; the factored interior eliminates loads inside."""
         s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.volume_stiffness
         if s.loads_inside:
             inside = s.Q[self.interior.dofs]
@@ -221,7 +221,7 @@ class Interior:
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
         """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).
 
-        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, else the library's.
+        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order; None: the library's.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False

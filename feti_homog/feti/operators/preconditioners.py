@@ -149,7 +149,7 @@ class SpringUpdate:
         self._places, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """Return the updated H r for z = H r (owned rows,) or (owned rows, k).  Collective."""
+        """Update the product z = H r, (owned rows,) or (owned rows, k), for the springs; return it.  Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))

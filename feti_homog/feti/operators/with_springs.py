@@ -126,7 +126,7 @@ class WithSprings:
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """Compute P^T A P (m, m) for P (n, m): the term of the body, as soft as its springs.
+        """Compute P^T A P (m, m) for P (n, m); A is the body's own term, reduced as S~ is.
 
         S~ + A is definite, because S and S~ have the same kernel.  The operator must be dense.
         """

@@ -9,7 +9,7 @@ An open node that overlaps and a closed node under tension violate the inequalit
 have the wrong status.  Block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994) on the
 strictly convex dual problem corrects wrong statuses: all wrong nodes change at once while the number of wrong nodes
 falls, or else only the first wrong node (Murty's rule).  Without free fibres gap = q + A p with a positive definite A,
-so that no set of statuses returns and the search ends.  With free fibres A is semi-definite, and an end is not certain.
+so that no set of statuses returns and the search ends.  With free fibres A is semi-definite; the search may not end.
 
 A damaged bond is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage, force <= 0).  With
 s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded node, for which C is
@@ -61,7 +61,7 @@ class ContactProblem:
         return self.solver.jump_operator.nodes
 
     def active(self, status: Status) -> Float:
-        """Mark the active multipliers (owned rows,) by 1.
+        """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
         All multipliers at bonded nodes, and normal forces at closed nodes, are active.
         """

@@ -5,8 +5,8 @@ debonded node carries no traction along the fibre.
 
 The damaged fraction of a bond has friction (Alfano & Sacco, 2006).  At damage d, slip s and stiffness K, the fraction
 1 - d bears (1 - d) K s, and the fraction d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.
-With g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the extra force f:
-lam = g / (C - C_0) + f, s = C_0 lam + g.  The solution has r = s - C lam.
+With g = d s_i, the bond is the intact spring in series with a face that has the jump g, the spring 1 / (C - C_0) and
+the extra force f: lam = g / (C - C_0) + f, s = C_0 lam + g.  `DualSolution.jump` of the bond is r = s - C lam.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ class CoupledInterfaces:
         return load.parts([len(problem.solver.problem.loads) for problem in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
-        """Return the load at the beginning of a leg to `end`.  Collective.
+        """Return the load at the beginning of the leg of a path to waypoint `end`.  Collective.
 
         The load has the values of the waypoint `before`.  Components that change between strain and stress take the
         values of the last point, `origin`, with 0 for a stress within the solver's error.
@@ -106,9 +106,9 @@ def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
-    """Return the energy of damaged bonds on this rank beyond lam C lam.
+    """Return twice the energy of damaged bonds on this rank, minus lam C lam.
 
-    C_0 lam^2 + g^2 / (C - C_0) exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
+    Twice the energy, C_0 lam^2 + g^2 / (C - C_0), exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
     """
     r, gained = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
     rows = np.flatnonzero(r)

@@ -44,8 +44,8 @@ class _Fibres:
     Attributes:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
-        reach: (motions,) largest gap or slip of each motion at any node: open nodes may lie within one rigid group.
-        fibre: (k,) number of the fibre; a fibre counts with its coating, and neighbouring layers count together.
+        reach: (motions,) largest gap or slip of each motion at any node, open or not.
+        fibre: (k,) number of the fibre; a fibre and its coating, and neighbouring layers, have one number.
     """
 
     is_open: Bool
@@ -118,8 +118,8 @@ class FloatingBodies:
         """Move the free fibres until no open node overlaps by more than noise.  Collective, decided on rank 0.
 
         A fibre that overlaps moves to the position with the largest minimum gap.  If even this gap overlaps, the dual
-        solution of the programme is a system of contact forces in balance: the nodes of these forces squeeze the fibre,
-        and have to close.
+        solution of the linear programme is a system of contact forces in balance: the nodes of these forces squeeze
+        the fibre, and have to close.
 
         Returns:
             Amplitudes (dimension,) to add to alpha, and (k,) open nodes that squeeze a fibre.

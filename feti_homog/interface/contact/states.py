@@ -145,7 +145,7 @@ def kkt_errors(
     force = traction[:, 0] * length
     largest_traction = np.maximum(over_interface(np.abs(traction).max(axis=1, initial=0.0)), stress)
     largest_force = np.maximum(over_interface(np.abs(force)), stress * over_interface(length))
-    # Without a strain errors are absolute.
+    # If no load acts, errors are absolute.
     displacement = displacement or 1.0
     largest_traction, largest_force = (np.where(size > 0.0, size, 1.0) for size in (largest_traction, largest_force))
     worst = np.array(

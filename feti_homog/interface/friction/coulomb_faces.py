@@ -189,7 +189,7 @@ class CoulombFaces(FaceSystem):
         """Find the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
 
         Raises:
-            StuckError: no statuses are admissible, or the determinant of the sliding faces has lost its sign.
+            StuckError: no statuses are admissible, or only statuses with a negative determinant.
         """
         load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
@@ -259,7 +259,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy lost on the straight path at constant load, and the heat in this energy."""
+        """Return the energy lost on the straight path at constant load, and the part of it that is heat."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -111,7 +111,7 @@ class FaceSystem:
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Update `FollowedStatuses` to given free rows; None with free motions, or before updates pay."""
+        """Update `FollowedStatuses` to given free rows; return None with free motions, or before updates pay off."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None

@@ -87,7 +87,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return the multipliers (k, c) in owned rows (k, c), with stored columns for the last rows."""
+        """Return the multipliers in owned rows (k, c), and store the columns of these rows for the next call."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -113,7 +113,7 @@ class CondensedProblem:
 class AxialFaces:
     """The part of the matrix S of `coulomb_faces` for the axial problem, with eliminated jumps: g = K^-1 b E.
 
-    A spring of HELD times the row's diagonal entry holds each row: the largest entry may belong to a stiff spring.
+    A weak spring holds each row: HELD times the row's own diagonal entry of K, as others may be far larger.
 
     Attributes:
         problem: condensed axial problem.
@@ -127,7 +127,7 @@ class AxialFaces:
         self.jumps = np.zeros_like(b)
         for _ in range(1 + INVERSE_ITERATIONS):
             self.jumps += lu_solve(factor, b - K @ self.jumps)
-        # Rounding of the bonded stiffness would carry a load.
+        # Stiffnesses up to UNRESISTED are rounding of the bonded stiffness, which must not carry a load.
         diagonal, stiffness = L.diagonal(), L - b.T @ self.jumps
         roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))

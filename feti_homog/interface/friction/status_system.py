@@ -5,7 +5,7 @@ grows with the sign s.  A row r in place of row j changes R = [M^-1; S M^-1] by 
 
     R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
 
-where w is a row of R.  Changes wait, and join R in blocks.
+where w is a row of R, or a sum of two.  Changes are collected, and added to R in blocks.
 """
 
 from collections.abc import Callable
@@ -41,9 +41,9 @@ LEAST_PIVOT = 1e-6
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
 # Largest number of refinements, and the residual of each row, relative to its terms, at which refinement ends.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
-# Largest number of changes that wait for their addition to R.
+# Number of changes that are collected before they are added to R.
 MOST_CHANGES = 32
-# Largest number of entries in a right-hand side for which only the columns of these entries are read.
+# Largest number of nonzero entries in a right-hand side for which only the columns of these entries are read.
 FEW = 8
 # Largest rounding in a row of S x, relative to its terms, that refinement may leave.
 NOISE = 1e-11
@@ -66,7 +66,7 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest residual (m,), relative to the terms (m,) of the row."""
+    """Return the largest of the residuals (m,), each relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
@@ -145,11 +145,11 @@ class StatusSystem:
 
 
 class FollowedStatuses:
-    """The matrix R = [M^-1; S M^-1] of m entries of x, which follows the changes of rows.
+    """The matrix R = [M^-1; S M^-1] for m entries of x, updated when rows of M change.
 
     Attributes:
         S: (m, m) as in `CoulombFaces`.
-        free: (m,) rows of S.
+        free: (m,) whether the entry of x is free: the row of M is then a row of S, else of the identity.
         slope: (m,) s mu at sliding nodes' slips, 0 elsewhere.
         sign: sign of det M.
     """
@@ -238,7 +238,7 @@ class FollowedStatuses:
         """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
 
         The present entries change to the units `units` (m,), and S changes between the entries with the indices
-        `other`.  Return False if a pivot is too small; then R is worthless.
+        `other`.  Return False if a pivot is too small; R is then useless.
         """
         # Prescribed entries have rows of the identity in M^-1: only the block of S M^-1 between these entries changes.
         entries, free, slope = np.flatnonzero(np.isin(old, other)), self.free.copy(), self.slope.copy()

@@ -30,7 +30,7 @@ Sections = Sequence[interface_section.InterfaceSection]
 
 @dataclasses.dataclass(frozen=True)
 class SectionValues:
-    """The values of keys from the [interface] sections `pair` (k,) at nodes (k,).
+    """The values of [interface] keys at nodes (k,), which belong to the sections `pair` (k,).
 
     The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
     """
@@ -152,15 +152,15 @@ class BondLaw(ABC):
     def first_factor(self, before: Float, direction: Float) -> Float | None:
         """Return the smallest load factors (p,) that break each bond, in closed form.
 
-        A bond breaks under the traction `before` + f `direction` (p, c) with the factor f >= 0, or inf if the bond
-        never breaks.  Return None if the law has no closed form.  `before` must break no bond.
+        The traction `before` + f `direction` (p, c) breaks the bond at the factor f >= 0; f is inf if the bond never
+        breaks.  Return None if the law has no closed form.  `before` must break no bond.
         """
         return None
 
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
         """Find the load factors (p,) at which bonds break, by bisection of [`low`, `high`].
 
-        A bond breaks under `before` + f `direction` (p, c); a factor `high` that is too low doubles.
+        A bond breaks under `before` + f `direction` (p, c); a factor `high` that is too low is doubled first.
         """
         high = high.copy()
         for _ in range(MOST_STEPS):

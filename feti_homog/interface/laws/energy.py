@@ -7,7 +7,7 @@ so that a criterion by spring energy depends on the mesh; a criterion by the rel
 inverse of the dual operator on the active rows, a break of bond i parts the faces by j = H_ii^-1 lam_i, and the energy
 of the cell falls, at constant strain, by
 
-    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if they would overlap and the normal force stays.
+    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, so that the normal force stays.
 """
 
 from __future__ import annotations
@@ -156,9 +156,9 @@ class ReleasedEnergy(SpringEnergy):
         interface.prepare(bonds)
         if not influence.rounding <= UTILISATION_TIE:
             raise ConvergenceError(
-                f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
+                f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of the released energy, '
                 f"expected at most {UTILISATION_TIE:g}: springs are too soft beside bodies that are cut or coated, or "
-                'phases too far apart; growth = "springs" bears more'
+                'phases too far apart; growth = "springs" tolerates more'
             )
 
 

@@ -100,8 +100,8 @@ class CohesiveLaw(SpringLaw):
             if teeth or excess <= tolerance:
                 return tuple(levels.tolist())
         raise CaseError(
-            f"[interface] softening_tolerance = {tolerance:g}: with {MOST_TEETH} teeth, the most, the first exceeds "
-            f"the peak traction by {excess:.1e} of it; expected at least that"
+            f"[interface] softening_tolerance = {tolerance:g}: even with {MOST_TEETH} teeth, the first tooth exceeds "
+            f"the peak traction by the fraction {excess:.1e}; expected at least this fraction"
         )
 
     @property
@@ -208,7 +208,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
 
     def _taken(self, d: Float, s: Float | float) -> Float:
-        """Return phi (p,), the energy that the damage d has taken, divided by W_0."""
+        """Return phi (p,), the energy that damage up to d takes, divided by W_0."""
         d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
         below = np.where(inside, d, 0.0)

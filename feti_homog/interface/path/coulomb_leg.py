@@ -1,7 +1,7 @@
 """Path legs with friction on debonded faces: linear pieces between changes of status and breaks of bonds.
 
-An equal load step is implicit: slips grow with the sign of the final traction.  The way within a step is unknown: the
-heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
+One of several equal load steps is implicit: slips grow with the sign of the final traction.  As the path within a step
+is unknown, the heat is the work of final forces on slips; the work of the loads is stored, released or heat.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +23,7 @@ from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-# Fraction of a leg after the last point, beyond which a change of statuses is a point.
+# Least fraction of a leg between the last point and a change of statuses that is a point, too.
 LEAST_SHARE = 0.01
 # Changes at one load that count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
@@ -33,10 +33,8 @@ CYCLE = "friction: the statuses of the faces change without end at one load (a c
 class CoulombLeg(Leg):
     """A leg with face statuses (n,) and scaled x (m,), as in `CoulombFaces`.
 
-    Rates solve a complementarity problem, and are constant until a face reaches a limit of its status, a bond its
-    strength, or s = 1.
-
-    A break is an implicit step at constant load to admissible statuses.
+    Rates solve a complementarity problem, and are constant until a face reaches a limit of its status, a bond reaches
+    its strength, or the leg ends.  A break is an implicit step at constant load to admissible statuses.
     """
 
     _state: Equilibrium | None
@@ -50,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Settle at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
+        """Find the state at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
@@ -91,10 +89,10 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective.
 
-        In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
-        the break releases the rest.
+        In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
+        slips is heat; the break releases the rest.
         """
         sliding, self._bonds = self.sliding, begin.bonds
         self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
@@ -120,7 +118,7 @@ class CoulombLeg(Leg):
         """Advance along the rates up to and past the next change.
 
         Raises:
-            NotCarriedError: nothing carries more, after a point at the largest load.
+            NotCarriedError: the cell carries no more load; the last point is at the largest load.
             StuckError: no statuses continue the state, or statuses change without end.
         """
         sliding, faces, start = self.sliding, self.sliding.faces, self._share
@@ -163,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the leg fraction that the cell carries, and the error that limits this fraction or None."""
+            """Return the leg fraction that the cell carries, and the error that limits this fraction, or None."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -26,14 +26,14 @@ class FrictionlessLeg(Leg):
 
     From the equilibrium at s the transitions are
 
-        overloaded   by a break, or by a contact change, at which the released energy of tips jumps.  The worst
-                     bonds break: a point; equilibrium at the same s without these bonds.
+        overloaded   A break, or a contact change at which the released energy of tips jumps, overloads bonds: the
+                     worst bonds break (a point); solve at the same s without these bonds.
         advance      With a linear response, predict the first break, the beginning of a contact change, and the
-                     end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
+                     end of the leg, and solve at the first of these.  If the stress is not on the line, or a bond
                      is overloaded, an event was missed: halve the step until no event is missed.  The result is
-          a break    the worst bonds break: a point; equilibrium at the same s without these bonds;
-          a change   a point; equilibrium a little further, where the change is beyond doubt;
-          less       a point if contact states have changed.
+          a break    the worst bonds break (a point); solve at the same s without these bonds;
+          a change   a point; solve a little further, where the change is beyond doubt;
+          neither    a point if contact states have changed.
         touch        Open faces do not carry the stresses of the load: a point where the faces touch.
         end          s = 1: a point.
 

@@ -1,4 +1,4 @@
-"""A leg of a path: the load between two waypoints, by events or in equal steps.
+"""A leg of a path: the loads from one waypoint to the next, by events or in equal steps.
 
 Two engines follow the load: `FrictionlessLeg` solves for equilibria, `CoulombLeg` for rates of faces with friction.
 """
@@ -19,9 +19,10 @@ SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """The leg with number `leg` between two loads of equal kinds, at a rising fraction s.
+    """The leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
-    Bonds break at constant load: a point, then the state after the break at the same s.
+    The loads at s = 0 and s = 1 prescribe the same components as strains and as stresses.  Bonds break at constant
+    load: a point of the path, then the state after the break at the same s.
 
     Attributes:
         limit: error that ended the last step before its load, or None.
@@ -49,7 +50,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after the break in `begin` if any.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:

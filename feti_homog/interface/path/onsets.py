@@ -22,7 +22,7 @@ from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_
 from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
 from feti_homog.typing import Bool, Float, Int
 
-# Parts of a straight way at whose ends a utilisation without convexity is evaluated.
+# Number of parts of a step at whose ends a utilisation that is not convex is evaluated.
 PARTS = 32
 
 
@@ -80,8 +80,8 @@ class Onset:
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
     """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
-    the bisection takes the first part of the step that ends with a utilisation above 1.
+    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once, where bisection finds it.
+    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
@@ -98,7 +98,7 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
     """Return the fractions of a step where contact begins to change, and where it surely has changed.
 
-    Both are 1 without a change.  A tension or an overlap of twice the solver's error is sure.  A closed node opens
+    Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens
     when its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when
     the fibre has no more room (because gaps are not unique).  Collective.
     """

@@ -27,9 +27,9 @@ def events(
 ) -> Iterator[Point]:
     """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with the strains or stresses, as its waypoint prescribes, of the state before.  The state of a point
-    precedes its break.  On later legs, and with friction on all, changes of contact are points too, with `broke` = 0:
-    between points the response is straight.  A point without convergence is the last one.
+    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a
+    point precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with
+    `broke` = 0: between points the response is straight.  A point without convergence is the last one.
 
     Raises:
         NotCarriedError: the last point is the load limit.
@@ -63,7 +63,7 @@ def increments(
     at the largest load that the cell carries.
 
     Raises:
-        NotCarriedError: nothing carries more, or a step has no admissible statuses.
+        NotCarriedError: the cell carries no more load, or a step has no admissible statuses.
     """
     legs, current = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):

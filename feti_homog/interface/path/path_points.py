@@ -70,7 +70,7 @@ class Point:
         scale: ratio of the point's state to the equilibrium `state`.
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before this state.
-        softened: number of bonds that lose teeth and hold.
+        softened: number of bonds that lose teeth but hold.
         energies: energies since the last point.
         used: (k,) utilisation before bonds break, 0 without a bond; empty in a point from a checkpoint.
         after: state from which the path continues.
@@ -95,7 +95,7 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) in the modes of their tractions, of any magnitude, in an equilibrium.  Collective.
+    """Break the bonds `which` (k,) of an equilibrium, whatever their tractions.  Collective.
 
     Return how many bonds part and how many soften, over all ranks, and the path state `place` after the break.
     """

@@ -21,7 +21,7 @@ ARRIVAL_TIMEOUT_S = SILENT_SECONDS
 
 
 class RemoteError(RuntimeError):
-    """A defect on another rank; the text is its traceback."""
+    """An unexpected exception (a defect) on another rank; the text is its traceback."""
 
 
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:

@@ -70,7 +70,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         import numpy as np
         from scipy.linalg import blas
 
-        # Every BLAS takes its buffers now: under a limit of addresses, OpenBLAS would later search for ever.
+        # Let every BLAS allocate its buffers now: under a limit of addresses, OpenBLAS might later retry for ever.
         square = np.eye(200)
         blas.dgemm(1.0, square @ square, square)
         matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
@@ -99,7 +99,7 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Return the fault of a module that cannot be imported; errors about NumPy mean another release."""
+    """Return the fault of a module that cannot be imported; an error about NumPy means a build for another one."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np

@@ -29,8 +29,8 @@ def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
-        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "relative tolerance of that method"),
-        Option(f"{prefix}pc_type", "cholesky|gamg|...", "cholesky", "that factor, or the method's preconditioner"),
+        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "relative tolerance of the iterative method"),
+        Option(f"{prefix}pc_type", "cholesky|gamg|...", "cholesky", "the factor, or a preconditioner of the method"),
         Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", "mumps", library),
     )
 
@@ -57,7 +57,7 @@ OPTIONS = (
     ),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
-    Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace there, in per cent"),
+    Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace for them, in per cent"),
     Option("feti_sub_ksp_type", "preonly|...", "preonly", "solves with implicit subdomains"),
     *_direct_solver("feti_sub_", "implicit subdomains"),
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
@@ -149,4 +149,4 @@ def help_text() -> str:
         f"  {usage:{width}}  {option.help}" + (f" (default {option.default})" if option.default else "")
         for usage, option in zip(usages, OPTIONS, strict=True)
     ]
-    return "\n".join(["PETSc's options of the solver, with a single dash; what only prints changes no number:", *lines])
+    return "\n".join(["PETSc options of the solver, with a single dash; printing options change no result:", *lines])

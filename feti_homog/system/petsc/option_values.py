@@ -160,8 +160,8 @@ RULES: dict[str, OptionRule] = {
 def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     """Split a command line into words of the program and words of PETSc.
 
-    PETSc has the options with a single dash, and the word after an option as its value, unless that word begins another
-    option or cannot be the value.  A negative number can be a value.
+    Options with a single dash belong to PETSc.  The word after such an option is its value, unless that word begins
+    another option or cannot be the value.  A negative number can be a value.
     """
     ours: list[str] = []
     petsc: list[str] = []

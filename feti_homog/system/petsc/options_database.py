@@ -16,7 +16,7 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Insert the options of a case below the options of the command line, for the block.
+    """Set the options of a case for the block; options of the command line take precedence.
 
     PETSc's flags cannot be false: false flags are removed for the block.
 
@@ -39,7 +39,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
         in_database = given_options()
         if faults := faults_of_solvers(in_database):
             raise CaseError(*faults)
-        # Some options are read by larger solvers alone: `refuse_unused` judges names that are not nearly in the table.
+        # Some options are read by larger solvers alone: names unlike the names in the table wait for `refuse_unused`.
         _refuse_unread([name for name in in_database if table.almost_in_table(name) and not values.is_flag(name)])
         yield
     finally:
@@ -89,7 +89,7 @@ def _refuse_unread(names: list[str]) -> None:
         raise CaseError(*(f"-{name}: no solver has such an option; {table.suggestion(name)}" for name in unread))
 
 
-# Options that this program reads, with prefixes of PETSc's solvers.
+# Options of this program whose names begin like the options of PETSc's solvers.
 OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
 SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in table.DIRECT_PREFIXES}
 """Prefixes of the options that a solver reads, by the prefix of the solver."""

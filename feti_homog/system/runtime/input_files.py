@@ -55,7 +55,7 @@ def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
 
 
 def unreadable(path: Path, error: OSError) -> FetiHomogError:
-    """Return the exception for an unreadable file: CaseError, or FetiHomogError without permission."""
+    """Return the exception for an unreadable file: CaseError, or FetiHomogError if permission is missing."""
     kind = FetiHomogError if isinstance(error, PermissionError) else CaseError
     is_open = "it is open in this program: close it, or open it with h5py.File(path, locking=False)"
     return kind(f"cannot read {path}: {is_open if 'file locking flag' in str(error) else error.strerror or error}")

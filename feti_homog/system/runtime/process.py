@@ -1,7 +1,7 @@
-"""The process: settings of its environment, limits before libraries are loaded, its memory, imports of Matplotlib.
+"""Prepare and measure the process: environment, limits of the system, memory, import of Matplotlib.
 
-Settings precede the imports of NumPy, h5py and MPI.  Under too low limits the program would hang or crash without a
-message.
+The environment is set before NumPy, h5py and MPI are imported.  With too low limits, the program would hang or crash
+without a message.
 """
 
 import ctypes
@@ -26,7 +26,7 @@ SETTINGS = {
 }
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
-# Bytes: a stack for MPI, which does not start with a quarter of it; addresses for a small run on one rank.
+# Bytes of stack for MPI, which does not start with a quarter of them; bytes of addresses for a small run on one rank.
 STACK, ADDRESSES = 1 << 20, 1 << 30
 
 

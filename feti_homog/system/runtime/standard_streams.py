@@ -1,4 +1,4 @@
-"""Standard output and error, whose failure does not stop a run, progress on them, and signals that end the process.
+"""Standard output and error (a failed write does not stop a run), progress, and signals that end the process.
 
 After Ctrl-C, or a signal of a launcher or batch system, the process prints one line and ends at once.  Python runs
 signal handlers only between its bytecodes, which a mesher or a factorization may delay for long; libraries replace
@@ -30,7 +30,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit o
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # Seconds that other ranks wait for the message of rank 0: Open MPI drops it after the end of another rank.
 SILENT_SECONDS = 5.0
-remarks = list[str]()  # that rank 0 prints where a signal ends the process
+remarks = list[str]()  # lines that rank 0 prints if a signal ends the process
 KEPT = "\n\t"  # characters that are printed although they are not printable; others, from files, are escaped
 
 
@@ -41,7 +41,7 @@ def end_on_signals() -> None:
     signals, as in a background job of a shell, remain ignored.  This function must be called before any thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
-    # Writing shows that the reader of a pipe has closed it.
+    # SIGPIPE is not needed: a write reports that the reader of a pipe has closed it.
     signal.pthread_sigmask(signal.SIG_BLOCK, {*awaited, signal.SIGPIPE})
 
     def wait_and_end() -> None:
@@ -109,7 +109,7 @@ def complain(*lines: str) -> None:
 class Progress:
     """The progress of a run: lines on rank 0, unless `quiet`, and `seconds` by stage.
 
-    `within` gets the finished share of the case and its words, in place of a bar.
+    If given, `within` is called with the finished share of the case and a text, in place of a bar.
     """
 
     def __init__(self, comm: Intracomm, quiet: bool, within: Callable[[float, str], object] | None = None) -> None:

@@ -152,5 +152,5 @@ def test_levels_of_damage_are_those_of_all_pairs_whatever_the_nodes():
 
 @pytest.mark.slow
 def test_a_tolerance_that_takes_too_many_teeth_is_refused():
-    with pytest.raises(CaseError, match="softening_tolerance = 1e-09: with 10000 teeth, the most, the first exceeds"):
+    with pytest.raises(CaseError, match="softening_tolerance = 1e-09: even with 10000 teeth, the first tooth exceeds"):
         made("bilinear", None, tolerance=1e-9)
