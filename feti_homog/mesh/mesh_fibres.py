@@ -122,7 +122,7 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """Number fibres and coatings (constituents,) from 1, the matrix 0; also return the mask of fibres.
+    """Return numbers (constituents,), from 1 for fibres and coatings, 0 in the matrix, and the mask of fibres.
 
     A coating has the lowest number of the fibres in it; a coating without a fibre counts as a fibre.
     """

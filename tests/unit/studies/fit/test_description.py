@@ -95,8 +95,8 @@ def test_tests_are_changes_of_one_case(tmp_path):
     [
         ("strain = [0.1, 0.0, 0.0]", "E11, S33\n0.01, 1.0\n", '[measured] curve: plane = "strain" has no S33'),
         ("strain = [0.1, 0.0, 0.0]", f"E11, S11\n{'1' * 200_000}, 1.0\n", "...: expected a number"),
-        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0,01,0,03\n", ", line 2: has 4 columns; expected 2, as there are names"),
-        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n\n0.01\n", ", line 3: has 1 columns; expected 2, as there are names"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0,01,0,03\n", ", line 2: has 4 columns; expected 2, one for each name"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n\n0.01\n", ", line 3: has 1 columns; expected 2, one for each name"),
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,0_3.0\n", ', line 2: S11 = "0_3.0": expected a number'),
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,nan\n", ', line 2: S11 = "nan": expected a number'),
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,\n", ', line 2: S11 = "": expected a number'),
