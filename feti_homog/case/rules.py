@@ -40,7 +40,7 @@ class Rule:
     Attributes:
         path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
         holds: tests the value; None if the path may have no value.
-        words: the expectation that an invalid value fails, or a function of value and selection that ends the line.
+        words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
         names: keys in the fault, reduced to those in the table if the table has any; empty: the fault shows the value.
     """
@@ -158,7 +158,7 @@ def _cell() -> Iterator[Rule]:
     yield replace(needed(CELL, "voids", line, beside="void_radius"), names=("void_radius",))
     line = f"expected {kinds.VOIDS_OF_A_RANDOM_CELL.expected}"
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
-    line = "expected true or false: the mesh has its voids"
+    line = "expected true or false: the mesh gives the voids"
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
     unit_loads, types_of_analysis = kinds.ANALYSIS_TYPE.among(*UNIT_LOADS), _values(kinds.ANALYSIS_TYPE)
     rule = belonging((*CELL, "boundary"), unit_loads, types_of_analysis, OWN_MESH)

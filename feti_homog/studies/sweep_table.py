@@ -90,7 +90,7 @@ class SweepTable:
 
     @property
     def stated(self) -> list[str]:
-        """The outputs with statistics for readers: neither times, memory and checks, nor zero in all cases."""
+        """The names of all outputs except times, memory, checks, and outputs that are zero in all cases."""
         names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
         return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 

@@ -51,7 +51,7 @@ class Uncertainty:
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers from a document, in which their means remain."""
+    """Extract the uncertain numbers from a document; the means remain in the document."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY
