@@ -183,7 +183,7 @@ def fit_document(
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
-        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals are wrong")
+        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
     faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], teeth)
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "

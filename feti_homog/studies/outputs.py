@@ -150,17 +150,17 @@ OUTPUT_COLUMNS = (
     Column("match_distance", "", "with `match`: distance of the cell from the table, in mean diameters"),
     Column("refine", "", "halvings of the mesh"),
     Column("elements", "", "triangles of the refined mesh"),
-    Column("nodes", "", "nodes of the refined mesh, counted for each body in each subdomain; depends on ranks"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain; depends on ranks"),
     Column("ranks", "", "MPI ranks"),
     Column("subdomains", "", "number of subdomains"),
     Column("dofs", "", "degrees of freedom of all subdomains"),
     Column("multipliers", "", "Lagrange multipliers of the dual problem"),
     Column("iterations", "", "Krylov iterations of all states"),
-    Column("Cij", records.STRESS, "entry of L^ef; in sweeps with generalized plane strain, C66 is always the shear modulus"),
+    Column("Cij", records.STRESS, "entry of L^ef; if the sweep has generalized plane strain, C66 is the shear modulus"),
     Column("kij", "conductivity", "entry of k^ef, with x3 along the fibres"),
     Column("Cij_compression", records.STRESS, "Cij under the negative unit strains, with contact"),
     Column("thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at zero strain"),
-    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at zero stress; also expansion_x2"),
+    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at zero stress; or along x2"),
     Column("expansion_STRAIN", "1 / temperature", "shear strain per unit of temperature at zero stress"),
     Column("anisotropy_normal", records.STRESS, "C11 - C22"),
     Column("anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; in generalized plane strain C66 - ..."),
@@ -202,9 +202,9 @@ OUTPUT_COLUMNS = (
     Column("load_STATUS", "", "interface nodes that are bonded, open or closed under this load"),
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
-    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest load at onset of all directions, if each has an onset"),
+    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest load at onset, if every direction has an onset"),
     *(
-        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} for each load with a name")
+        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} for a named load")
         for name, unit, words in (
             ("principal", records.STRESS, "principal stress"),
             ("von_mises", records.STRESS, "von Mises stress"),

@@ -86,7 +86,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
             name = stresses_of_path[k] + stress_label(document)
             lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {strains[k]} = {strain:.6g} (point {number})")
     if path_curves.scales_with_toughness(document):
-        lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
+        lines.append("Scaling: strains and stresses of the path grow with the root of the toughness")
     return lines
 
 
