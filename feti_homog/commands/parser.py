@@ -24,7 +24,7 @@ EXPORT_HELP = (
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
     "result.h5, by independent elements; print a line for each law, with its largest violation and limit. Exit code 3 "
-    "if a law is broken. Needs neither MPI nor PETSc; on several ranks each does all checks, and the first one prints."
+    "if a law is broken. Needs neither MPI nor PETSc; on several ranks each does all checks, and the first prints."
 )
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
