@@ -34,7 +34,7 @@ class ParameterEstimates:
         computed, residuals: (m,) f(x) and (f(x) - y) / s.
         jacobian: (m, n) derivatives of the residuals.
         at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
-        singular_values: (n,) of the Jacobian for unknowns relative to their estimates.
+        singular_values: (n,) of the Jacobian by relative unknowns, x / estimate.
         directions: (n, n) right singular vectors of the same Jacobian, in rows.
         evaluations: number of evaluations of f.
         converged: whether the search reached a minimum.

@@ -189,8 +189,8 @@ OUTPUT_COLUMNS = (
     Column(
         "peak_Sij",
         records.STRESS,
-        "stress of a path that is largest in magnitude, with its sign, even if the path ends before the stress falls; "
-        "in the direction of the leading strain, the stress of `peak`",
+        "largest stress of a path in magnitude, with its sign, even if the path ends before the stress falls; for the "
+        "component whose strain leads, the stress of `peak`",
     ),
     Column("peak_STRAIN", "", "strain at the peak, for the component whose strain leads"),
     Column("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),

@@ -191,7 +191,7 @@ class DiscreteCell:
         return sums
 
     def loads(self, strain: Float, temperature: float) -> Float:
-        """Add the largest thermal strain of a phase to a strain (v,)."""
+        """Return a strain (v,) plus the largest thermal strain of any phase, as a scale."""
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float) -> Scales:

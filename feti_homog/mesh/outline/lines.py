@@ -199,8 +199,8 @@ def _refuse_many(edges: float, limit: int) -> None:
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
     """Place nodes on lines at equal steps of the integral of ds / h, with the edge size h.
 
-    A line has at least `least_edges`, () or (c,), edges. Each line has at least `least_samples` equidistant samples of
-    h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
+    `least_edges`, () or (c,), is the least number of edges of a line. A line has at least `least_samples` equidistant
+    samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
 
     Raises:
         MeshError: the lines would have more than `limit` nodes.

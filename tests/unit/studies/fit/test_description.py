@@ -100,7 +100,7 @@ def test_tests_are_changes_of_one_case(tmp_path):
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,0_3.0\n", ', line 2: S11 = "0_3.0": expected a number'),
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,nan\n", ', line 2: S11 = "nan": expected a number'),
         ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,\n", ', line 2: S11 = "": expected a number'),
-        ("strain = [0.1, 0.0, 0.0]", 'E11,S11\n"0,01","3"\n', ", line 2: has 3 columns; expected 2, as there are"),
+        ("strain = [0.1, 0.0, 0.0]", 'E11,S11\n"0,01","3"\n', ", line 2: has 3 columns; expected 2, one for each"),
         ("strain = [0.1, 0.0, 0.0]", "E11,E22,S11\n0.01,1,3\n", ": expected one column of a strain, such as E11, and"),
         ("strain = [0.1, 0.0, 0.0]", "", ": expected one column of a strain, such as E11, and"),
         ("strain = [0.1, -0.2, 0.0]", "E11, S11\n0.01, 1.0\n",
