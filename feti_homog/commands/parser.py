@@ -31,7 +31,7 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv with inputs and outputs of all cases, statistics.csv with means and scatter over realisations, and "
+    "Write cases.csv with inputs and outputs of all cases, statistics.csv with means and scatter over realisations and "
     "a picture of moduli; print means of constants or peaks. The sweep may still be running, with unfinished paths."
 )
 FIT_HELP = (
