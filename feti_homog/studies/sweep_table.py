@@ -48,8 +48,8 @@ class SweepTable:
     Attributes:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
-        inputs: by dotted key the value of each case, None if the key does not vary in the case.
-        outputs: by name the values (cases,), NaN for cases without the output; for unfinished paths, values so far.
+        inputs: value of each case by dotted key, None if the key does not vary in the case.
+        outputs: values (cases,) by name, NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
     """
 

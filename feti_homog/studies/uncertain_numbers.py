@@ -45,7 +45,7 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] of a document whose numbers are the means."""
+        """Return the section [uncertainty] for a document whose numbers are the means."""
         pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 

@@ -240,7 +240,7 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
-        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at r."""
+        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at the points `r`."""
         free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
             yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))

@@ -168,7 +168,7 @@ class Scanner:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Read the words of the next line, without blank lines and METADATA blocks; empty at the end."""
+        """Read the words of the next line, past blank lines and METADATA blocks; empty at the end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)

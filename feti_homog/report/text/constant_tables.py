@@ -77,9 +77,9 @@ def _errors(document: Document) -> Document:
 
 
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals.
+    """Return a table of constants and mesh errors, `abreast` per line.
 
-    Errors have two digits, and constants as many decimals as their errors.
+    Errors have two digits, and constants as many decimals as their errors; ratios without an error have six decimals.
     """
     rows = []
     for name, value in values.items():

@@ -17,7 +17,7 @@ ROWS = 15  # of the table
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
 
-    Columns: strains that waypoints drive, stresses that they name or that act, temperature, other strains.
+    Columns: leading and prescribed strains, named and acting stresses, temperature, strains of prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
