@@ -248,7 +248,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test, or has a fault of other rules."""
+    """Return whether an [interface] section passes a test, or is missing or no table, which other rules report."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
@@ -259,7 +259,7 @@ def _some_arc(table: Any) -> bool:
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether bonds can break: a finite strength, or a law with a fixed limit."""
+    """Return whether bonds can break: by a finite strength, or by a law that always has a limit."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
