@@ -1,4 +1,4 @@
-"""FETI-based homogenization of fibre composites; see the README.  Importing it starts neither MPI nor PETSc.
+"""FETI-based homogenization of fibre composites; see the README.  Its import starts neither MPI nor PETSc.
 
 In your own program, under `mpirun` or not:
 
@@ -13,16 +13,16 @@ In your own program, under `mpirun` or not:
 - `Case`: a checked case, from a file (`Case.load`) or a document with the same sections (`Case.parse`).
 - `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: results of many cases, and their table.
 - `run_fit`: constants of cases from measured values.
-- `draw_state`: the deformed cell of a state into Matplotlib's axes.  `read_state`: its fields as arrays.
+- `draw_state`: draw the deformed cell in a state into Matplotlib's axes.  `read_state`: fields of a state as arrays.
 - `launch`: run a program with its own and PETSc's options; errors end it as on the command line.
-- `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
+- `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks; `faults` are lines.
 """
 
 import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-# Debian's h5py is the build with MPI only if it is asked for before its first import.
+# Debian's h5py takes its MPI build only if this variable is set before the first import.
 os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from feti_homog.analysis import result
     from feti_homog.studies import sweep_table
 
-RUNNING = threading.RLock()  # PETSc bears one thread
+RUNNING = threading.RLock()  # PETSc allows one thread at a time
 
 
 def run(
@@ -227,7 +227,7 @@ def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
         raise FetiHomogError("MPI has ended" if ended else "another thread of this process works with PETSc")
     try:
         if "petsc4py.PETSc" not in sys.modules:
-            # On more ranks PETSc would wait for ranks without a case; a case brings its communicator.
+            # On all ranks, PETSc would wait for ranks without a case; cases have their own communicators.
             _start_petsc([], MPI.COMM_SELF)
         yield comm
     finally:

@@ -34,7 +34,7 @@ class FetiHomogError(Exception):
     def __init__(self, *faults: str) -> None:
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]
-        room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # one more is as short as the count
+        room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # one more fault, or a line with its count
         more, end = sum(counts.values()) + max(len(lines) - room, 0), LONGEST_LINE - KEPT_END - 3
         lines[room:] = [f"and {more} more faults"] if more else []
         # The reason stands at the end of a line.
@@ -58,7 +58,7 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge or a check failed; the computed part is written and marked."""
+    """A solve did not converge or a check failed; the computed part is written as `not converged`."""
 
     exit_code = ExitCode.UNCONVERGED
 

@@ -17,7 +17,7 @@ class BondLawEntry:
         keys: keys of [interface] that only some laws have, and this law has.
         needs: keys that this law requires.
         limits: keys, one of which must be finite for bonds to break; empty if the law always has a limit.
-        description: the utilisation that reaches 1 when a bond breaks, or the softening, for the reference.
+        description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows before a bond breaks.
         has_process_zone: whether elements must resolve the length along which bonds break.
@@ -39,22 +39,22 @@ STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 BRANCH = ("openings", "tractions")
-"""Keys of cohesive laws: STRENGTHS, COHESIVE and OF_SOFTENING of all laws, BRANCH of the law "table" alone."""
+"""Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH to the law "table" alone."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (
     *(
         BondLawEntry(name, f"strength.{name.capitalize()}Strength", STRENGTHS, words, OF_STRENGTHS, limits=STRENGTHS)
         for name, words in (
-            ("max", "the largest of t_n / R^n, |t_t| / R^t and along the fibre |t_a| / R^a"),
-            ("quadratic", "the root of the sum of their squares"),
+            ("max", "the largest of t_n / R^n, |t_t| / R^t and, along the fibre, |t_a| / R^a"),
+            ("quadratic", "the root of the sum of the squares of these ratios"),
         )
     ),
     BondLawEntry(
         "energy",
         "energy.SpringEnergy",
         ("toughness", "growth", "mode_sensitivity"),
-        "the energy of its spring / G_c, see toughness",
+        "the energy of the bond's spring / G_c, see toughness",
         ((r"G_\mathrm{Ic}", "toughness", False),),
         needs=STIFFNESSES,
         has_process_zone=True,
@@ -71,8 +71,8 @@ REGISTRY = (
             has_process_zone=True,
         )
         for name, description, needs in (
-            ("bilinear", "a cohesive law, softening in a straight line", (*STIFFNESSES, *COHESIVE)),
-            ("exponential", "softening exponentially", (*STIFFNESSES, *COHESIVE)),
+            ("bilinear", "linear softening", (*STIFFNESSES, *COHESIVE)),
+            ("exponential", "exponential softening", (*STIFFNESSES, *COHESIVE)),
             ("table", "softening by openings and tractions", (*STIFFNESSES[1:], *COHESIVE[1::2], *BRANCH)),
         )
     ),

@@ -26,7 +26,7 @@ from feti_homog.system.runtime import input_files
 FIELDS = {"load": "single_load"}  # the field of [load]: Case.load is a method
 STUDIES = {
     sections.SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
-    sections.UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
+    sections.UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` propagates it to results",
 }
 """Sections of files with many cases, and the command for each."""
 
@@ -85,7 +85,7 @@ class Case:
         return cls(name=document.get("name", "case"), source=(document, folder), **contents)
 
     def replace(self, changes: Mapping[str, Any]) -> Case:
-        """Return the checked case with other values by dotted key, as `{"material.fibre.young": 80.0}`.
+        """Return the checked case with other values by dotted key, such as `{"material.fibre.young": 80.0}`.
 
         All other keys stay as in the file or document.  A number, from 1, selects one of several sections or an entry
         of a list, as in `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12` sets
@@ -135,12 +135,12 @@ class Case:
 
     @property
     def fewer_events(self) -> str:
-        """Advise on the key with which a path of damage has fewer events; empty for other cases."""
+        """Return advice on the key that gives a damage path fewer events; empty for other cases."""
         has_events = self.path is not None and self.path.method == "events"
         if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
             return ""
         by = "fewer teeth" if self.interface.teeth else "a larger softening_tolerance"
-        return f"; {by} in [interface] makes a path of fewer events"
+        return f"; {by} in [interface] would give fewer events"
 
     def warnings(self) -> tuple[str, ...]:
         """List valid but probably unintended settings, one per line."""
@@ -184,7 +184,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.
 
-        Name, PETSc options and max_events are left out; without `with_output` so is [output].
+        Name, PETSc options and max_events are left out; without `with_output`, [output] is left out, too.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
@@ -275,7 +275,7 @@ def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str 
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section to a dataclass; a faulty or absent section gives None."""
+    """Read a section into a dataclass; return None for a faulty or absent section."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

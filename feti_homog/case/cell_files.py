@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "pixels": IMAGE_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
-# Distance from a cut window / radius, up to which a centre outside counts as on the border.
+# Distance from a cut window / radius, up to which a centre outside counts as a centre on the border.
 LEFT_OUT = 0.01
 
 
@@ -94,13 +94,13 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
     if cell.coating is not None and "coating" in table.given:
-        faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
+        faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column coating; give one")
     elif cell.coating is not None:
         coating = np.where(table.is_void, 0.0, cell.coating)
         table = replace(table, columns={**table.columns, "coating": coating})
     check_shapes(table, faults)
     for shape in [] if cell.tip_size is None else shapes.given_shapes(table.columns, has_tips=False):
-        words = f"{table.name} has {shape.name}, and with them no nodes at tips"
+        words = f"{table.name} has {shape.name}, whose meshes have no nodes at tips"
         faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
     for name in ("width", "height"):
         asked, stored = getattr(cell, name), getattr(table, name)

@@ -53,14 +53,14 @@ class Cell:
 
     geometry: str = key(
         types.choice(*CIRCULAR, "table", "mesh", "pixels"),
-        '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
-        'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
-        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK; "pixels": an image of labels.',
+        '"square": one fibre in the middle of a square cell; "hexagonal": fibres in the middle and at the corners of a '
+        'cell sqrt(3) times as high as wide; "random": random fibres in a square cell; "table": fibres from a table, '
+        'for example of a micrograph; "mesh": a mesh file of gmsh, Abaqus, VTK or Medit; "pixels": a label image.',
     )
     fibre_fraction: float | None = key(
         types.real(above=0.0, below=1.0),
-        "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
-        "(hexagonal; random, where min_gap lowers it).",
+        "Area of the fibres / area of the cell. It must be below the fraction at which fibres touch: pi/4 (square), "
+        "pi/sqrt(12) (hexagonal and random; min_gap lowers the limit of random cells).",
         only=ALL_CIRCULAR,
         unless=("match", "mix"),
         default_words="required, or given by match or mix",
@@ -83,56 +83,56 @@ class Cell:
     )
     coating: float | None = meshed_key(
         types.real(least=0.01, most=1.0),
-        'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
-        "fibre_fraction and fibre_radius are those without them, gaps those with them. Coatings of ellipses make both "
-        "semi-axes longer by coating sqrt(a b).",
+        'Thickness of the coating around every fibre / radius of the fibre; the coating has the phase "coating". '
+        "fibre_fraction and fibre_radius exclude the coatings, gaps lie between the coatings. The coating of an "
+        "ellipse makes both semi-axes longer by coating sqrt(a b).",
         absent="none, or the column coating of a table",
     )
     mesh_size: float = key(
         types.real(least=1e-4, most=0.5),
-        "Size of the elements, before refine, / width of the cell. At most 1000000 are made, 20000000 in cells of 400 "
-        "or more round fibres and voids, counting the small ones in narrow gaps and thin coatings.",
+        "Element size before refine / width of the cell. A mesh has at most 1000000 elements, or 20000000 in cells of "
+        "400 or more round fibres and voids; small elements in narrow gaps and thin coatings count.",
         default=0.05,
         only=SIZED,
     )
     interface_size: float | None = meshed_key(
         types.real(least=1e-5, most=0.5),
-        "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
-        "0.4 of the distance. At most mesh_size.",
+        "Element size on interfaces, before refine / width of the cell. Away from interfaces, elements grow to "
+        "mesh_size by 0.4 times the distance. At most mesh_size.",
         absent="mesh_size",
     )
     tip_size: float | None = meshed_key(
         types.real(least=1e-6, most=0.5),
-        "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
-        "like those on interfaces. At most interface_size.",
-        absent="such that tips err no more than the rest; of paths and envelopes interface_size",
+        "Element size at the tips of debonded arcs, before refine / width of the cell. Away from tips, elements grow "
+        "as they do away from interfaces. At most interface_size.",
+        absent="chosen so that tips err no more than the rest; in paths and envelopes interface_size",
     )
     refine: int = key(
         types.integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
+        "How often every element is split in four, in parallel; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     accuracy: float | None = meshed_key(
         types.real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
-        "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
-        "order, unless it is given. If the estimated error is more, a remark names the mesh that would do. It is not "
-        "that of paths after bonds break, nor of polygons with sharp corners.",
+        "effective stiffness. The program then chooses mesh_size, refine and, unless given, order; mesh_size, refine, "
+        "interface_size and tip_size must be left out. If the estimated error is larger, a remark names a sufficient "
+        "mesh. Paths after bonds break, and polygons with sharp corners, have larger errors.",
         absent="none",
     )
     order: int = key(
         types.integer(least=1, most=2),
-        "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "
-        "on round interfaces; those of phases with isotropic constants, but in plane stress, have a cubic bubble and a "
-        "linear pressure of their own and serve up to poisson = 0.5. With accuracy that of the two which takes fewer "
-        "nodes, unless it is given.",
+        "Order of the triangles. 1: linear triangles, which lock above poisson = 0.49 except in plane stress. 2: "
+        "quadratic triangles, curved on round interfaces. Except in plane stress, quadratic triangles of isotropic "
+        "phases also have a cubic bubble and a linear pressure, and serve up to poisson = 0.5. With accuracy, the "
+        "default is the order that takes fewer nodes.",
         default=1,
         default_words="1, or 2 above poisson = 0.49",
     )
     bodies: str = key(
         types.choice("torus", "plane"),
-        '"torus": a fibre that the boundary of the cell cuts is one body; "plane": its parts are bodies of their own. '
-        "The stiffness is the same.",
+        '"torus": a fibre that the boundary of the cell cuts is one body; "plane": each part of such a fibre is a '
+        "separate body. The stiffness is the same.",
         default="torus",
     )
     fibres: int | None = random_key(
@@ -143,36 +143,35 @@ class Cell:
     )
     mix: Mapping[str, float] | None = random_key(
         kinds.FRACTIONS,
-        "Fibres of several phases, in place of fibre_fraction: the area of those of each / area of the cell. Each "
-        "needs its [material.NAME].",
+        "Fibres of several phases, in place of fibre_fraction: for each phase, area of its fibres / area of the cell. "
+        "Each phase needs a section [material.NAME].",
         absent="none",
     )
     radii: Mapping[str, float] | None = random_key(
         kinds.RADII,
-        "Mean radius of the fibres of each phase of mix, in place of fibre_radius. Of fibres, or of as many as a cell "
-        "of this width takes, each phase gets the nearest whole number, at least one; its radii are then scaled such "
-        "that its fraction is exact.",
+        "Mean fibre radius of each phase in mix, in place of fibre_radius. The phases share the number fibres, or as "
+        "many as the width allows: each gets the nearest whole number, at least one. The radii of a phase are then "
+        "scaled so that its fraction is exact.",
         unit="length",
-        absent="equal ones",
+        absent="equal radii",
     )
     voids: float | bool | None = key(
         kinds.VOIDS,
-        "Of a random cell voids among the fibres, min_gap from them and from each other: their area / area of the "
-        "cell. Of a mesh, true: where it has no elements there are voids; without it such holes are faults.",
+        "In a random cell: area of the voids / area of the cell; voids lie among the fibres, at least min_gap from "
+        "fibres and from each other. In a mesh: true, if holes without elements are voids; else holes are faults.",
         absent="none", only=GEOMETRY.among("random", "mesh"),
     )  # fmt: skip
     void_radius: float | None = random_key(
         types.real(least=0.05, most=20.0),
-        "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "
-        "their radius is then scaled such that their fraction is exact.",
+        "Radius of the voids / mean radius of the fibres. The cell gets the nearest whole number of voids, at least "
+        "one; their radius is then scaled so that their fraction is exact.",
         absent="1",
     )
     match: Path | None = key(
         kinds.TABLE_FILE,
-        "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
-        'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
-        "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
-        "discs of the same area.",
+        "File, relative to the case file, with a table of the fibres in a micrograph: columns x, y, radius, and a "
+        'comment such as "# width = 120, height = 80". The cell gets the radii of the table and, as nearly as min_gap '
+        "allows, the distributions of distances to the two nearest neighbours. Ellipses count as equal-area discs.",
         absent="none",
         only=RANDOM,
     )
@@ -185,82 +184,83 @@ class Cell:
         default=0,
     )
     radius_spread: float = random_key(
-        types.real(least=0.0, most=0.5), "Largest difference of a radius from the mean / mean radius.", default=0.0
+        types.real(least=0.0, most=0.5), "Largest deviation of a radius from the mean / mean radius.", default=0.0
     )
     file: Path | None = key(
         kinds.CELL_FILE,
-        'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
-        'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
-        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files cell data "
-        '"phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "pixels" the image (.png, .tif, .npy, .npz), a '
-        'whole number each, see labels. Of "table" the fibres, a row for each: columns x, '
-        "y, radius and, if there are any, phase, coating (thickness / radius) and strength "
-        "(of its bonds / that of [interface]); of ellipses a and b, the semi-axes, in place of the radius, and angle "
-        "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
-        "of the first corner. Rows of the phase void are voids. What "
-        'follows # is a comment, of which "# width = 120, height = 80" gives the size of the cell.',
+        'Path relative to the case file. With geometry = "mesh": triangles or quadrilaterals, linear or quadratic, '
+        'that fill a rectangle, in physical surfaces "matrix", "fibre", "glass", ...; nodes on opposite sides match, '
+        "and fibres may have any shape. In Abaqus files (.inp), element sets have these names; in .vtu and .vtk files, "
+        'cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... With "pixels": an image (.png, .tif, '
+        '.npy, .npz) with one whole number a pixel, see labels. With "table": one row for each fibre, with columns x, '
+        "y, radius and, optionally, phase, coating (thickness / radius) and strength (of its bonds / strength in "
+        "[interface]). Ellipses have semi-axes a and b in place of the radius, and the angle from x to a in degrees; "
+        "hollow fibres have an inner_radius; rounded polygons have sides, corner, and the angle of the first corner. "
+        'Rows of the phase void are voids. Text after # is a comment; "# width = 120, height = 80" gives the size of '
+        "the cell.",
         only=FROM_A_FILE,
         absent="required, or fibre_list of a table",
     )
     phases: Mapping[str, tuple[str | int, ...]] | None = key(
         kinds.PHASES,
-        "Names and numbers in the file, by the phase that they are of, where they are not the phases' names: physical "
-        "surfaces of gmsh; element sets and materials of sections of Abaqus; numbers of VTK's cell data and Medit's "
-        "references. Capitals do not matter. debonded has those of lines that are debonded from the start.",
+        "For each phase, its names or numbers in the file, where these differ from the name of the phase: gmsh's "
+        "physical surfaces; Abaqus's element sets, or materials of sections; numbers in VTK's cell data; Medit's "
+        "references. Capitals do not matter. The entry debonded names lines that are debonded from the start.",
         only=MESH,
         absent="none",
     )
     repair: str = key(
         types.choice("none", "snap", "overlaps"),
-        '"snap", of a mesh: nodes on sides that nearly match are moved to match; the result has how far. "overlaps", '
-        "of a table: fibres that touch, or overlap by less than 1 % of a radius, are made smaller until they do not; "
-        "the result names the rows.",
+        '"snap", for meshes: nodes on sides that nearly match move until they match; the result states how far. '
+        '"overlaps", for tables: fibres that touch, or overlap by less than 1 % of a radius, shrink until they '
+        "separate; the result names the rows.",
         default="none",
         only=REPAIRABLE,
     )
     snap_tolerance: float = key(
         types.real(least=0.0, most=0.1),
-        'How far nodes may be moved by repair = "snap" / width of the cell.',
+        'Largest move of a node by repair = "snap" / width of the cell.',
         default=1e-3,
         only=MESH,
     )
     boundary: str = key(
         types.choice("periodic", "displacement", "traction"),
-        'Conditions on the sides. "displacement": u = E x, for meshes that are not periodic; the stiffness is then an '
-        'upper bound of the effective one of the material that the cell is a piece of. "traction": t = Sigma n, its '
-        "lower bound. Neither needs matching nodes, and both tend to the effective stiffness as cells grow; of "
-        'conductivity they prescribe T = G x and -q n. They belong to type = "stiffness" and "conductivity".',
+        'Conditions on the sides. "displacement": u = E x, for meshes that are not periodic; the result is an upper '
+        'bound of the effective stiffness of the material from which the cell was cut. "traction": t = Sigma n, which '
+        "gives a lower bound. Neither needs matching nodes; both bounds tend to the effective stiffness as cells grow. "
+        'For conductivity they prescribe T = G x and -q n. Only with type = "stiffness" or "conductivity".',
         default="periodic",
         only=OWN_MESH,
     )
     columns: tuple[str, ...] | None = key(
         kinds.NAMES_OF_COLUMNS,
-        "Names of the columns of a table, in place of a line of names; others than those of file are not read.",
+        "Names of the columns of a table, in place of a line of names. Columns other than those of file are ignored.",
         only=TABLE,
         absent="the first line of the table",
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
-        kinds.FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
+        kinds.FIBRE_LIST, "The fibres, as a list in place of file.", only=TABLE, absent="given by file"
     )
     labels: Mapping[str, str] = key(
         kinds.LABELS,
-        'The phase of each number in an image, such as {0 = "matrix", 255 = "fibre"}, or "void".',
+        'The phase, or "void", of each number in an image, such as {0 = "matrix", 255 = "fibre"}.',
         only=PIXELS,
     )
-    pixel: float = key(types.real(least=1e-9, most=1e9), "Edge of a pixel.", unit="length", default=1.0, only=PIXELS)
+    pixel: float = key(types.real(least=1e-9, most=1e9), "Side of a pixel.", unit="length", default=1.0, only=PIXELS)
     smooth: bool = key(
         types.boolean,
-        "Of an image: with false each pixel is two triangles, by turns along one diagonal and the other; with true "
-        "gmsh meshes the regions within smooth outlines (marching squares of scikit-image), by mesh_size.",
+        "With false, each pixel becomes two triangles, whose diagonals alternate. With true, gmsh meshes the regions "
+        "within smooth outlines (marching squares of scikit-image) by elements of mesh_size.",
         default=False,
         only=PIXELS,
     )
     window: str = key(
         types.choice("periodic", "cut", "mirrored"),
-        'What a table or image is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its '
-        'sides cut them well, unless a file gives left and bottom. "cut", of a table: a piece of something larger, '
-        "whose fibres may overlap across the border: they are moved apart as little as can be. Those with centres "
-        'outside are left out. "mirrored", of an image: beside and above it lie its mirror images, four in a cell.',
+        'What a table or image shows. "periodic": a periodic cell, whose fibres must not overlap; they shift together '
+        'so that the cell sides cut them well, unless a file gives left and bottom. "cut", for tables: a window of a '
+        "larger section, whose fibres may overlap across the border; these move apart as little as possible, and "
+        'fibres with centres outside are left out. "mirrored", for images: the cell is the image with its three mirror '
+        "images, beside it, above it, and diagonally across.",
         default="periodic",
         only=GEOMETRY.among("table", "pixels"),
     )

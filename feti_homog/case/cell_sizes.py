@@ -18,8 +18,8 @@ from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
 """Largest Poisson's ratio of linear triangles; above it they lock."""
-# Above it rounding brings checks to their tolerance: at 0.4999999, beside fibres a thousandth as stiff as the matrix,
-# products with iterative refinement lower the error of energies from 2e-4 to 1e-9.
+# Poisson's ratio above which rounding brings checks to their tolerance. At 0.4999999, with fibres a thousandth as stiff
+# as the matrix, iterative refinement lowers the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999
 
 
@@ -38,7 +38,7 @@ def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> li
 def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[str, ...]:
     """List the phases that require quadratic elements, one per line."""
     lines = _above(LOCKING_POISSON, materials, plane)
-    return tuple(f"{line}: elements are quadratic, for linear ones lock above {LOCKING_POISSON}" for line in lines)
+    return tuple(f"{line}: elements are quadratic, since linear ones lock above {LOCKING_POISSON}" for line in lines)
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
@@ -97,7 +97,7 @@ def sized(
         refinements[p] = max(0, ceil(log(error / cell.accuracy, 4**p))) if error > 0 else 0
     order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
     if refinements[order] > MOST_REFINED:
-        better = "a larger one, or order = 2" if order == 1 else "a larger one"
+        better = "a larger value, or order = 2" if order == 1 else "a larger value"
         faults.append(
             f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
             f"{MOST_REFINED}; expected {better}"
@@ -237,10 +237,10 @@ def mix_faults(cell: Cell) -> list[str]:
         return faults
     expected_counts = _expected_counts(cell)
     if (count := fsum(expected_counts.values())) > types.MOST_FIBRES:
-        words = f"expected at most {types.MOST_FIBRES}, of larger radii or a smaller cell"
+        words = f"expected at most {types.MOST_FIBRES}: give larger radii or a smaller cell"
         return [f"{given}: makes {count:.2g} fibres; {words}"]
     return [
-        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5, of more fibres or a wider cell"
+        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least 0.5: give more fibres or a wider cell"
         for phase, expected in expected_counts.items()
         if expected < 1 - expected  # nearer to no fibre than to one
     ]

@@ -29,7 +29,7 @@ def _stress(name: str, *only: keys.Condition) -> Any:
 class MixedLoad:
     """Prescribed components of a macroscopic load: the strain or the stress of each, never both.
 
-    On a path, components that a load does not name stay as last prescribed; they are free of stress at first.
+    On a path, a component that a load does not name keeps its last prescribed value; before, it is free of stress.
     """
 
     E11: float | None = _strain("E11")
@@ -46,7 +46,7 @@ class MixedLoad:
     S12: float | None = _stress("S12")
     temperature: float | None = key(
         types.real(),
-        "A change of temperature, 0 until it is named. Every phase must give its expansion.",
+        "Change of temperature, 0 until a load names it. Every phase must give its expansion.",
         unit="temperature",
         default=None,
         only=kinds.GENERALIZED,
@@ -69,10 +69,10 @@ WAYPOINTS = types.list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Complete the loads of a path: name and value for each component.
+    """Complete the loads of a path: name -> value for every component.
 
     In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
-    the former load; before the first load, all stresses are zero.
+    the previous load; before the first load, all stresses are zero.
     """
     state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
@@ -140,7 +140,7 @@ PLANE_OF_LOADS = types.either(
 
 @dataclass(frozen=True, kw_only=True)
 class Angle(AnalysisSection):
-    """Openings of the arcs, one after the other."""
+    """Successive openings of the debonded arcs."""
 
     values: tuple[float, ...] = key(kinds.OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
     strain: Strain | None = key(
@@ -162,25 +162,25 @@ class Angle(AnalysisSection):
 
 @dataclass(frozen=True, kw_only=True)
 class Envelope(AnalysisSection):
-    """The plane of macroscopic stresses or strains in which the onset of debonding is sought, along rays from zero."""
+    """The onset of debonding on rays from zero, in a plane of two macroscopic stresses or strains."""
 
     breaks: ClassVar[bool] = True
 
     plane: tuple[str, str] = key(
         PLANE_OF_LOADS,
-        "The two axes of the plane; all other stresses, or all other strains, are zero: in plane strain and plane "
-        'stress those in the plane, S11, S22, S12 or E11, E22, gamma12; in plane = "generalized" all six, of which S12 '
-        "is shear across the fibres, S13 and S23 are along them.",
+        "The two axes of the plane; all other stresses, or all other strains, are zero. In plane strain and plane "
+        'stress, two of S11, S22, S12 or of E11, E22, gamma12; with plane = "generalized", two of all six components, '
+        "where S12 is shear across the fibres, S13 and S23 are shear along the fibres.",
     )
     directions: int = key(
         types.integer(least=4, most=100_000),
-        "Number of rays, evenly spaced; the first is along the first axis. On each the load is a factor times "
-        "(cos, sin) of its direction.",
+        "Number of rays, evenly spaced; the first is along the first axis. On a ray, the load is a factor times "
+        "(cos, sin) of the direction.",
         default=72,
     )
     temperature: float | None = key(
         types.real(),
-        "A change of temperature that comes first, at zero stress in a plane of stresses, at zero strain in one of "
+        "Change of temperature before the load, at zero stress in a plane of stresses, at zero strain in a plane of "
         "strains. Every phase must give its expansion.",
         unit="temperature",
         default=None,
@@ -210,8 +210,8 @@ class LoadPath(AnalysisSection):
     )
     waypoints: tuple[Strain | MixedLoad, ...] | None = key(
         WAYPOINTS,
-        "Loads that the path reaches in turn, each a strain or a table as in to; each differs from the one before. "
-        "Components that a table does not name stay as last prescribed, at first free of stress.",
+        "Loads that the path reaches in turn: each is a strain or a table as in to, and differs from the load before. "
+        "Components that a table does not name keep their last prescribed values; before, they are free of stress.",
         default=None,
     )
     method: str = key(

@@ -13,7 +13,7 @@ from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
-SUGGESTED = (phase_names.MATRIX, phase_names.FIBRE, phase_names.COATING, "fibre:2")  # of phases that may have any name
+SUGGESTED = (phase_names.MATRIX, phase_names.FIBRE, phase_names.COATING, "fibre:2")  # phases may have any name
 FORMS_OF = {
     name: [form for form, constants in material_forms.MATERIAL_FORMS.items() if name in keys.keys_of(constants)]
     for contents in material_forms.MATERIAL_FORMS.values()

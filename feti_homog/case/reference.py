@@ -21,8 +21,8 @@ WIDTH = 100  # characters of a printed line
 INDENTED = textwrap.TextWrapper(WIDTH, initial_indent=6 * " ", subsequent_indent=6 * " ", break_on_hyphens=False)
 
 MATERIAL_MEANING = (
-    "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
-    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of five forms."
+    "One section for each phase: [material.matrix], [material.fibre] and, for other phases of meshes and tables, such "
+    "as [material.glass]; fibre:2 without a section has the constants of fibre. A section has one of five forms."
 )
 
 
@@ -63,12 +63,12 @@ class TableReference:
 
 
 PETSC_MEANING = (
-    "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, belong there "
-    "alone."
+    "options of the solver without their dash. The command line takes precedence; PETSc's own options, such as "
+    "-log_view, belong there alone."
 )
 UNCERTAINTY_MEANING = (
-    "scatter of numbers, which `feti-homog uncertainty` passes on to constants, onsets and peaks, of first order. "
-    "`feti-homog run` takes none."
+    "scatter of numbers, which `feti-homog uncertainty` propagates to constants, onsets and peaks, to first order. "
+    "`feti-homog run` refuses this section."
 )
 NAME = KeyRow("name", types.text.expected, "", "the file's name", "", "Name of the case.")
 PETSC_OPTION = KeyRow(
@@ -77,8 +77,8 @@ PETSC_OPTION = KeyRow(
 )  # fmt: skip
 DEVIATION = KeyRow(
     "SECTION.KEY", "a number above 0", "that of the key", "", "",
-    "Standard deviation of a number, whose value is the mean. In place of both, the number itself may be {mean, std} "
-    "or {mean, cv}, cv = std / |mean|.",
+    "Standard deviation of a number, whose own value is the mean. Instead, the number itself may be {mean, std} or "
+    "{mean, cv}, with cv = std / |mean|.",
 )  # fmt: skip
 PAIR_WORDS = "a list of [KEY, KEY, VALUE], values from -1 to 1"
 PAIRS = KeyRow(sections.CORRELATION, PAIR_WORDS, "", "", "", "Correlation of pairs of these numbers.")
@@ -129,7 +129,7 @@ def _has(word: str, *texts: str) -> bool:
 
 
 def text(word: str = "", results: Sequence[str] = ()) -> str:
-    """Write the reference, after an index of all keys by need, or the tables with a word, then lines of results."""
+    """Write the reference with an index of keys by need; with a word, its tables and the lines of `results`."""
     references = tables(word, results)
     if word:
         described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)

@@ -16,7 +16,7 @@ from feti_homog.schema import TableReader, keys, types, wording
 
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
-# Largest ratio of toughness to the energy at the peak: 1 - d of a damage d near 1 has three of its digits left.
+# Largest ratio of toughness to the energy at the peak: beyond, 1 - d has less than three digits for a damage d near 1.
 MOST_BRITTLE = 1e12
 COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
 """Keys with one value for all interfaces: every [[interface]] section must repeat it."""
@@ -85,7 +85,7 @@ def stress_free(
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Read the interface sections in file order; None if a section is faulty.
+    """Read the interface sections in file order; return None if a section is faulty.
 
     Each section gets its law as `criterion`, and the numbers that follow from its softening branch.
     """
@@ -147,7 +147,7 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of an interface section: softening numbers, too small toughness, and friction.
+    """Yield the faults of an interface section: softening numbers, too small a toughness, and friction.
 
     `table` is the section as in the file; a separate rule reports its missing keys.
     """
@@ -201,4 +201,4 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
         bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
         for name, number in _of_branch(bare).items():
             if not math.isclose(given := getattr(interface, name), number, rel_tol=SAME):
-                yield f"{name} = {given:g}: expected {number:g}, that of openings and tractions, or none"
+                yield f"{name} = {given:g}: expected {number:g}, as from openings and tractions, or no value"

@@ -40,7 +40,7 @@ class Rule:
     Attributes:
         path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
         holds: tests the value; None if the path may have no value.
-        words: the expectation that an invalid value fails, or a function of value and selection that ends the line.
+        words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
         names: keys in the fault, reduced to those in the table if the table has any; empty: the fault shows the value.
     """
@@ -158,7 +158,7 @@ def _cell() -> Iterator[Rule]:
     yield replace(needed(CELL, "voids", line, beside="void_radius"), names=("void_radius",))
     line = f"expected {kinds.VOIDS_OF_A_RANDOM_CELL.expected}"
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
-    line = "expected true or false: the mesh has its voids"
+    line = "expected true or false: the mesh gives the voids"
     yield Rule((*CELL, "voids"), lambda value: isinstance(value, bool), line, (MESH,))
     unit_loads, types_of_analysis = kinds.ANALYSIS_TYPE.among(*UNIT_LOADS), _values(kinds.ANALYSIS_TYPE)
     rule = belonging((*CELL, "boundary"), unit_loads, types_of_analysis, OWN_MESH)
@@ -248,7 +248,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test, or has a fault of other rules."""
+    """Return whether an [interface] section passes a test, or is missing or no table, which other rules report."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
@@ -259,7 +259,7 @@ def _some_arc(table: Any) -> bool:
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether bonds can break: a finite strength, or a law with a fixed limit."""
+    """Return whether bonds can break: by a finite strength, or by a law that always has a limit."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))

@@ -28,7 +28,7 @@ def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueT
         return names_phases and all(map(number.accepts, value.values()))
 
     return types.ValueType(
-        f"a table by phase, other than matrix, coating and void, of {words}, such as {example}",
+        f"a table by phase of {words}, such as {example}, without matrix, coating and void",
         accepts,
         lambda value: {phase: float(entry) for phase, entry in value.items()},
     )
@@ -78,7 +78,7 @@ LABELS = types.ValueType(
     dict,
 )
 VOIDS_OF_A_RANDOM_CELL = types.real(least=0.0, most=0.5)
-VOIDS = types.either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, types.boolean)
+VOIDS = types.either(f"true for a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, types.boolean)
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", types.real(least=1e-9, most=1e9))
 FIBRE = types.integer(least=1)
 FIBRES = replace(

@@ -29,21 +29,21 @@ STD = types.real(above=0.0)
 
 AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
 AXIS_MEANING = (
-    "Values of any key of the file, instead of or beside the one in its section. A list of tables for a section is "
-    'merged into it: cell = [{geometry = "square"}, {geometry = "random", fibres = 30}]; further keys of that section '
-    'are then quoted: "cell.refine" = [0, 1].'
+    "Values of any key of the file; its section may also give the key. A section may get a list of tables, each of "
+    'which is merged into it: cell = [{geometry = "square"}, {geometry = "random", fibres = 30}]; further keys of that '
+    'section are then quoted: "cell.refine" = [0, 1].'
 )
 
 RANGE_KEYS = {
     "from": keys.Key(types.real(), "First value, below the last.", required=True),
     "to": keys.Key(types.real(), "Last value.", required=True),
-    "step": keys.Key(types.real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
+    "step": keys.Key(types.real(above=0.0), "Distance between values, at most to - from; for linear ranges."),
     "count": keys.Key(
         types.integer(least=2, most=types.MOST_ROWS),
         "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
     "scale": keys.Key(
-        types.choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'
+        types.choice("linear", "log"), '"log": values with a constant ratio, above 0.', default='"linear"'
     ),
 }
 """Keys of a range; not a dataclass, because `from` is a keyword of Python."""
@@ -51,12 +51,12 @@ RANGE_KEYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class SweepSection:
-    """Many cases in one file: keys that vary, each with its values, and how these are combined."""
+    """Many cases in one file: keys that vary, their values, and the way to combine the values."""
 
     mode: str = key(
         types.choice("grid", "zip"),
-        '"grid": all combinations, the last key in the file fastest; "zip": first values with first, second with '
-        "second.",
+        '"grid": all combinations, where the last key in the file varies fastest; "zip": the first values of all keys '
+        "together, then the second values, and so on.",
         default="grid",
     )
     samples: int | None = key(
@@ -70,7 +70,7 @@ class SweepSection:
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
         types.integer(least=1, most=types.MOST_ROWS),
-        "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
+        "Number of random arrangements at each point; the k-th has the seed [cell] seed + k - 1 at all points.",
         default=None,
     )
 
@@ -81,15 +81,15 @@ class Analysis:
 
     type: str = key(
         types.choice("stiffness", "angle", "path", "load", "envelope", "conductivity"),
-        '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
-        '"path": debonding by the load, see [path]; "load": the response to one load, under which nothing breaks, see '
-        '[load]; "envelope": the loads at which debonding begins, see [envelope]; "conductivity": the effective '
-        "conductivity, of heat, electricity or diffusion, or the dielectric constant.",
+        '"stiffness": the effective stiffness; "angle": the response as a function of the debonding angle, see '
+        '[angle]; "path": debonding along a load path, see [path]; "load": the response to one load, under which '
+        'nothing breaks, see [load]; "envelope": the loads at which debonding begins, see [envelope]; "conductivity": '
+        "the effective conductivity for heat, electricity or diffusion, or the dielectric constant.",
     )
     plane: str = key(
         types.choice("strain", "stress", "generalized", "conduction"),
         'Plane state: "strain" for long fibres along x3, "stress" for a thin sheet; "generalized" is '
-        'generalized plane strain: long fibres under all six strains, also along x3. "conduction" is that of type = '
+        'generalized plane strain: long fibres under all six strains, also along x3. "conduction" belongs to type = '
         '"conductivity", where the key may be left out.',
     )
 
@@ -110,9 +110,9 @@ class Decomposition:
     )
     cut: str = key(
         types.choice("auto", "bodies"),
-        '"bodies": each body is cut by itself. "auto": the faster way, which is to cut the whole cell across its '
-        "materials if nothing can part, unknowns are at most 400 000, stiffnesses differ by at most 1e3, and neither "
-        "another key nor a solver option is given, except tolerances and options that only print.",
+        '"bodies": each body is cut separately. "auto": the faster way: the cell is cut across its materials if no '
+        "faces can separate, unknowns are at most 400 000, stiffnesses differ by at most 1e3, and the case gives no "
+        "other key here and no solver option except tolerances and options that only print; else as with bodies.",
         default="auto",
     )
 
@@ -124,7 +124,7 @@ class Output:
     fields: bool = key(types.boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(
         STATES,
-        "The points of a path whose fields are written. A number: at most this many points: both ends, up to half "
+        "The points of a path whose fields are written. A number: at most so many points: both ends, up to half "
         'around the deepest stress drops, the rest evenly between. "peaks": both ends and the points around all drops '
         'of more than 1 % of the largest stress. "all": every point. The curve always has every point.',
         default=20,
@@ -132,21 +132,21 @@ class Output:
     )
     mesh_error: bool = key(
         types.boolean,
-        "Estimate the error that the mesh makes of every constant: about a twentieth of a run that writes fields where "
-        "refine >= 1, up to a sixth of large cells without fields and of those with elements of order 2, a seventh of "
-        "a case in sweeps of small cells, a fifth of bonded cells with linear elements; else, with polygons, and "
-        "beside debonded arcs with elements of order 2 or a tip_size, up to three fifths of one without fields.",
+        "Estimate the mesh error of every constant. With refine >= 1, the estimate takes about 5 % of the time of a "
+        "run that writes fields, up to 17 % in large cells without fields or with elements of order 2, 14 % in sweeps "
+        "of small cells, 20 % in bonded cells with linear elements. With refine = 0, with polygons, and beside "
+        "debonded arcs with elements of order 2 or a tip_size, it takes up to 60 % of a run without fields.",
         default=True,
     )
     sensitivities: bool = key(
         types.boolean,
-        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and by the "
-        'fraction of a bonded square or hexagonal pattern, and a picture of them, in [analysis] type = "stiffness", '
-        '"load" and "conductivity". Bonded cells need no further solve. With contact they are those at fixed status, '
-        "for which every load takes as many solves more as there are unit loads. Faces with friction have none.",
+        "Compute and draw the derivatives of all constants of the cell by all constants of its phases and elastic "
+        "interfaces, and by the fraction of a bonded square or hexagonal pattern; only with [analysis] type = "
+        '"stiffness", "load" or "conductivity". Bonded cells need no further solve. With contact, derivatives hold at '
+        "fixed status, and every load takes as many more solves as there are unit loads. Friction allows none.",
         default=False,
     )
-    pictures: bool = key(types.boolean, "Draw PNG files, without fields curves alone.", default=True, presentation=True)
+    pictures: bool = key(types.boolean, "Draw PNG files; without fields, only curves.", default=True, presentation=True)
     report: bool = key(types.boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
         types.choice("auto", "S11", "S22", "S12", "S33", "S23", "S13"),
@@ -158,8 +158,8 @@ class Output:
     )
     deformation_scale: float | None = key(
         types.real(least=0.0),
-        "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
-        "turns over, but at least 1 under a given strain.",
+        "Factor of the drawn displacements. By default, displacements and openings are visible and no element turns "
+        "over, but the factor is at least 1 under a given strain.",
         absent="automatic",
         only=MECHANICAL,
         presentation=True,
@@ -174,8 +174,8 @@ class Unknown:
 
     start: float = key(
         types.real(),
-        "First value, not outside of the bounds. If the search from it ends with a misfit or a fault, it begins again "
-        "at the best of 11 points within the bounds, an evaluation each.",
+        "First value, within the bounds. If the search from this value ends with a misfit or a fault, it begins again "
+        "at the best of 11 points within the bounds, at the price of one evaluation for each.",
     )
     lower: float = key(types.real(), "Lower bound.")
     upper: float = key(types.real(), "Upper bound, above the lower one.")
@@ -188,21 +188,21 @@ class Measured:
     value: float = key(
         types.real(),
         "Measured value. Names for a stiffness are as in `sensitivities` of result.json, such as E1 or G_axial: E1, "
-        "E2, G12 are across the fibres, E_axial, G_axial, expansion_axial along them. Names for a path are as in "
-        "cases.csv, such as onset_S11 and peak_S11. A section [[test]] also has the keys in which its case differs, "
-        "such as cell.fibre_fraction = 0.5.",
+        "E2, G12 are across the fibres; E_axial, G_axial, expansion_axial are along the fibres. Names for a path are "
+        "as in cases.csv, such as onset_S11 and peak_S11. A section [[test]] also has the keys in which its case "
+        "differs, such as cell.fibre_fraction = 0.5.",
     )
     std: float = key(STD, "Standard deviation of the measurement.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredCurve:
-    """A measured curve = {file, std} of a fit whose analysis is a path of one leg."""
+    """A measured curve = {file, std} of a fit whose analysis is a path to one waypoint."""
 
     file: Path = key(
         types.file_name("the name of a .csv file", ".csv"),
-        "A table with a head: a column of strains, such as E11, that rise with the load, and one of stresses, S11. "
-        "Columns are parted as in tables of fibres.",
+        "A table with column names: a column of strains, such as E11, that rise with the load, and a column of "
+        "stresses, such as S11. Separators are as in fibre tables.",
     )
     std: float = key(STD, "Standard deviation of each stress.", unit="stress")
 
@@ -222,7 +222,7 @@ SECTIONS: dict[str, type[Any]] = {
 GROUPS = {
     "start here": "name cell.geometry cell.fibre_fraction cell.width cell.fibre_radius material.young material.poisson "
     "analysis",
-    "fibres: random, coated, of tables; meshes of your own": "cell",
+    "fibres: random, coated, from tables; your own meshes": "cell",
     "meshes": "cell.accuracy cell.mesh_size cell.refine cell.order cell.interface_size cell.tip_size cell.bodies",
     "materials and their strengths": "material",
     "interfaces": "interface",

@@ -31,7 +31,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     try:
         content = input_files.read(path, types.MOST_BYTES, pipes=True).decode("utf-8-sig")
         if DEEP_KEY.search(content):
-            raise RecursionError  # for tomllib takes time in the square of the length
+            raise RecursionError  # tomllib would take time in the square of the length
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -160,7 +160,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the entry of a list with one entry, unless `name` is a section number, else `table` itself."""
+    """Return the only entry of a list, unless `name` is a section number; else return `table` itself."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 

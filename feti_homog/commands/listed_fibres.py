@@ -63,7 +63,7 @@ class ListedFibres:
 
     Attributes:
         size: (2,) width and height.
-        ellipses: N circles and ellipses, where a table lists them, else about centres within the cell.
+        ellipses: N circles and ellipses, at the places in the table, or else with centres within the cell.
         phases: N phase names; in cells that the program meshes, voids follow the fibres.
         coatings: (N,) thickness of the coatings, 0 without a coating.
         cores: (N,) radii of the voids within hollow fibres, else 0.

@@ -30,7 +30,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw circles over an image, in TABLE_circles.png; return its name.  Raises CaseError if that is the image."""
+    """Draw circles over an image, in TABLE_circles.png; return its name.  Raises CaseError if both are one file."""
     from feti_homog.report.plots import plot_helpers  # with Matplotlib
 
     picture = table.with_name(f"{table.stem}_circles.png")

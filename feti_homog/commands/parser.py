@@ -14,36 +14,36 @@ from feti_homog.system.petsc import option_table
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 FIBRES_HELP = (
-    'Print a row for each fibre, with centre, radius or semi-axes, and phase: the file of [cell] geometry = "table". '
-    "The table of a cell gives that cell again."
+    "Print a table with a row for each fibre: centre, radius or semi-axes, and phase. A case with [cell] geometry = "
+    '"table" reads the table and has the same cell again.'
 )
 EXPORT_HELP = (
-    'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '
-    "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
+    'Print the constants of a stiffness or envelope in plane = "generalized", or a conductivity, as a material card. '
+    "Axis 1 of the card is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
 )
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
-    "result.h5, with elements of its own: a line per law, with its largest violation and limit. Exit code 3 if a law "
-    "is broken. Needs neither MPI nor PETSc; on several ranks each does all of it, and the first one prints."
+    "result.h5, by independent elements; print a line for each law, with its largest violation and limit. Exit code 3 "
+    "if a law is broken. Needs neither MPI nor PETSc; on several ranks each does all checks, and the first prints."
 )
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a picture of "
-    "moduli; print means of constants or peaks. The sweep may still be running: begun paths have their points so far."
+    "Write cases.csv with inputs and outputs of all cases, statistics.csv with means and scatter over realisations and "
+    "a picture of moduli; print means of constants or peaks. The sweep may still be running, with unfinished paths."
 )
 FIT_HELP = (
-    "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
-    "Every evaluation is kept: the same command resumes. Prints estimates with confidence intervals, their "
-    "correlation, and measured beside computed values. Exit code 3 with the names of unknowns that the data do not "
-    "determine, and for a model that does not describe the data (a chance below 1e-3)."
+    "Fit the unknowns of a file to measured values by least squares, with exact derivatives where they exist. Every "
+    "evaluation is stored: the same command resumes. Prints estimates with confidence intervals, their correlation, "
+    "and measured beside computed values. Exit code 3 if the data do not determine some unknowns, which are named, or "
+    "if the model does not describe the data (a chance below 1e-3)."
 )
 SCATTER_HELP = (
     "Find the scatter of the constants, onsets and peaks of a case whose numbers are {mean, std} or {mean, cv}, with "
-    "each number's share, beside that between the realisations of a random cell and the error of the mesh. Where a "
-    "result has no exact derivative, the case runs with the number one standard deviation less and more. The same "
+    "the share of each number, beside the scatter between realisations of a random cell and the mesh error. Where a "
+    "result has no exact derivative, the case also runs one standard deviation below and above the mean. The same "
     "command resumes."
 )
 
@@ -69,23 +69,23 @@ def command_parser() -> Parser:
     run.add_argument("case", type=Path, metavar="CASE.toml")
     run.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
     run.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    run.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
+    run.add_argument("--resume", action="store_true", help="continue an interrupted path in the same folder")
     check = _command(commands, "run.check", "validate a case file, mesh its cell and describe the run")
-    check.add_argument("case", type=Path, metavar="CASE.toml", help="a file of run, sweep, fit or uncertainty")
+    check.add_argument("case", type=Path, metavar="CASE.toml", help="a file for run, sweep, fit or uncertainty")
     _add_products(commands)
     _add_studies(commands)
     keys = _command(commands, "run.keys", "print the keys of a case file and their meaning")
-    words = "a section, or a word of names and descriptions: cell, friction, ...; by default all, after an index"
+    words = "a section, or a word in names and descriptions: cell, friction, ...; by default all keys, with an index"
     keys.add_argument("word", nargs="*", metavar="WORD", help=words)
-    _command(commands, "run.options", "print PETSc's options that the solver takes")
+    _command(commands, "run.options", "print the PETSc options of the solver")
     return parser
 
 
 def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     """Add the commands for results to a parser."""
     of_result = [
-        _command(commands, "products.plot", "make the pictures of a results folder again"),
-        _command(commands, "products.report", "write report.html of a results folder: one page with all there is"),
+        _command(commands, "products.plot", "draw the pictures of a results folder again"),
+        _command(commands, "products.report", "write report.html, one page with everything in a results folder"),
         _command(
             commands,
             "products.fields",
@@ -110,7 +110,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
         default="vtkhdf",
         help="vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd",
     )
-    words = "program that reads the card, needed: abaqus, calculix, ansys, moose, csv"
+    words = "program that reads the card (required): abaqus, calculix, ansys, moose, csv"
     export.add_argument("--format", default="", metavar="PROGRAM", help=words)
     export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
     export.add_argument(
@@ -119,7 +119,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
         action="store_const",
         const="transversely isotropic",
         default="orthotropic",
-        help="the nearest transversely isotropic material, not the one in the axes of the cell",
+        help="the nearest transversely isotropic material, instead of the computed one",
     )
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     fibres = _command(commands, "products.fibres", "print the fibres of a cell as a table", FIBRES_HELP)
@@ -127,7 +127,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     source.add_argument("source", type=folder, nargs="?", metavar="CASE.toml|DIR", help="a case file or results folder")
     text = "find round fibres in a micrograph; --out FILE.csv also draws them, in FILE_circles.png"
     source.add_argument("--image", type=Path, metavar="IMAGE", help=text)
-    fibres.add_argument("--pixel", type=length, default=1.0, metavar="LENGTH", help="edge of a pixel of the image")
+    fibres.add_argument("--pixel", type=length, default=1.0, metavar="LENGTH", help="side of a pixel of the image")
     fibres.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
 
 
@@ -135,18 +135,18 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
     """Add the commands for many cases to a parser."""
     sweep = _command(commands, "studies.sweep", "run the cases of a file with [sweep]", SWEEP_HELP)
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
-    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, with a subfolder for each case")
     one = sweep.add_mutually_exclusive_group()
-    one.add_argument("--list", action="store_true", help="print the cases, with --out also how far they are; run none")
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
-    words = "make one table and a picture of the cases of a sweep's folder"
+    words = "make the tables and the picture of a sweep folder"
     collect = _command(commands, "studies.collect", words, COLLECT_HELP)
     collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
-    collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
+    collect.add_argument("--no-pictures", action="store_true", help="make only the tables")
     fit = _command(commands, "studies.fit", "fit constants of cases to measured values", FIT_HELP)
     fit.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
     fit.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the fit")
-    scatter = _command(commands, "studies.uncertainty", "pass scatter of numbers on to results", SCATTER_HELP)
+    scatter = _command(commands, "studies.uncertainty", "propagate the scatter of numbers to results", SCATTER_HELP)
     scatter.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with uncertain numbers")
     scatter.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the runs")
     for parser in (sweep, fit, scatter):
@@ -155,7 +155,7 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
             "--ranks-per-case",
             type=integer,
             metavar="R",
-            help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
+            help="ranks for each case; groups of R ranks run cases at the same time (by default R is all ranks)",
         )
         parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
 

@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of the case file, or of the keys, sections and results with a word."""
+    """Print the reference of the case file, or of the keys, sections and results that contain a word."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 

@@ -24,11 +24,11 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
     Args:
         points: (n, 2) nodes or edge middles; coordinates on sides are exactly 0 or the period.
-        period: (2,) width and height, or the distance between images of a cell without any.
+        period: (2,) width and height, or `CoarseMesh.shift` for a cell that may lack periodic images.
 
     Yields:
         The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
-        period, both in ascending order along the side.  Beside voids points without partners are left out.
+        period, both in ascending order along the side.  Points beside voids that have no partner are left out.
     """
     for axis in (0, 1):
         along = points[:, 1 - axis]
@@ -50,20 +50,20 @@ class CoarseMesh:
         triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
             square pixels, the lower left corner first, from which `submeshes.halved` makes triangles.
         phase: (m,) index into `phases`, whose first name is "matrix".
-        precedence: (m,) order for the numbers of constituents, 0 in the matrix: the fibre number, or the phase where
-            fibres have no number.
+        precedence: (m,) sort key by which constituents are numbered: 0 in the matrix, else the fibre number, or the
+            phase if fibres have no numbers.
         representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
         ellipses: k circles and ellipses in the plane; periodic images have separate entries.
-        arc_edges: (a, 2) edges with both ends on an ellipse, to rounding.
-        arc_circle: (a,) the ellipse of each such edge.
+        arc_edges: (a, 2) edges with both ends on one ellipse, up to rounding.
+        arc_circle: (a,) the ellipse of each edge in `arc_edges`.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: largest move of a node in a user's mesh to make opposite sides match.
         origin: lower left corner of the cell in the coordinates of the user.
-        remarks: differences of a cell from the fibre table, and unused curves in a user's mesh, in a line each.
+        remarks: one line for each difference between cell and fibre table; unused curves in a user's mesh.
         boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only the first has images of nodes.
-        centres: (fibres, 2) fibre centres, if the precedence is the fibre number from 1, with the numbers of coatings
-            behind in the same order; else None.
+        centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then
+            the coatings in the same order.
     """
 
     width: float
@@ -91,7 +91,7 @@ class CoarseMesh:
 
     @property
     def shift(self) -> Float:
-        """The distance (2,) between periodic images; without images far longer than any cell."""
+        """The distance (2,) between periodic images; 1e30 for a cell without images."""
         return self.period if self.boundary == "periodic" else np.full(2, 1e30)
 
     def scaled(self, factor: float) -> "CoarseMesh":
@@ -124,7 +124,7 @@ def edge_keys(pairs: Int32, nodes: int) -> Int:
 
 
 def twins(keys: Int) -> tuple[Int, Int]:
-    """Pair successive equal keys (n,): two index arrays in the order of keys."""
+    """Find pairs of equal keys (n,); return the two index arrays (p,), in ascending order of keys."""
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     return order[same], order[same + 1]
@@ -143,10 +143,10 @@ def representatives(points: Float, width: float, height: float) -> Int32:
 
 
 def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
-    """Flip edges of triangles (m, 3) with two edges on one circle.
+    """Flip the chords of triangles (m, 3) that have two edges on one circle.
 
-    Curved edges would give such a triangle an angle of 180 degrees. A few rounds exchange the third edge, a chord, for
-    the other diagonal of the two triangles beside the chord.
+    Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
+    by the other diagonal of the quadrilateral around the chord.
     """
     triangles = triangles.copy()
     for _ in range(8):

@@ -1,6 +1,6 @@
 """The fibres in a mesh: numbers, centres, radii, semi-axes and coating thickness; unwrapped positions on the torus.
 
-The centres are the origins of the directions on interfaces.
+Directions on interfaces are angles about the centres.
 """
 
 import numpy as np
@@ -11,16 +11,16 @@ from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# Largest distance between centres of nested curves, and largest difference of the coating thickness on both semi-axes /
-# longer semi-axis.
+# Limits / longer semi-axis: distance between the centres of nested curves, and difference between the thicknesses of a
+# coating along both semi-axes.
 SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
     """Unwrap a submesh from the torus by a walk through the triangles.
 
-    The walk closes if every class has a unique unwrapped position. Only then, the submesh can rotate; a submesh that
-    winds around the torus cannot rotate.
+    The walk closes if every class has a unique unwrapped position. Only then can the submesh rotate: a submesh that
+    winds around the torus cannot.
 
     Returns:
         Shifts (t, 2) of the triangles by whole periods; true if the submesh is contractible.
@@ -57,7 +57,7 @@ def unwrap(submesh: Submesh) -> tuple[Float, bool]:
 
 
 def fibre_circles(torus: Torus) -> Float:
-    """Return the centre, in any image, and the radius (constituents, 3) of each outer circle.
+    """Return centre and radius (constituents, 3) of each fibre's outer circle, in any periodic image.
 
     Fibres that are not round have the radius NaN, and the centre in `CoarseMesh.centres` or else the area centroid. The
     centre is NaN for the matrix, and for fibres that wind around the torus.
@@ -122,9 +122,9 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """Assign numbers (constituents,) from 1 to fibres and coatings, 0 to the matrix; also mark fibres.
+    """Return numbers (constituents,), from 1 for fibres and coatings, 0 in the matrix, and the mask of fibres.
 
-    A coating has the lowest number of the coated fibres; a coating without a fibre counts as a fibre.
+    A coating has the lowest number of the fibres in it; a coating without a fibre counts as a fibre.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]
@@ -143,8 +143,8 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
 def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
     """Return the coating thickness (fibres,), 0 for fibres without a coating.
 
-    Arguments are the results of `fibre_numbers`, and semi-axes (constituents, 2). The thickness is the difference of
-    the semi-axes: NaN without semi-axes, and if both axes differ by different lengths.
+    `numbers` and `is_fibre` come from `fibre_numbers`; `semi_axes` is (constituents, 2). The thickness is the
+    difference of the semi-axes: NaN without semi-axes, or if the two axes give different thicknesses.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1

@@ -1,7 +1,7 @@
 """The coarse cell as a torus: node classes, torus edges and constituents.
 
 Two plane nodes that differ by a period form one class, and two boundary edges that differ by a period form one
-torus edge.  A constituent is a connected part of one phase on the torus: a fibre cut by the cell boundary is one.
+torus edge.  A constituent is a connected part of one phase on the torus, even if the cell boundary cuts it.
 """
 
 from __future__ import annotations
@@ -155,8 +155,8 @@ class Torus:
     def touching(self) -> Bool:
         """The mask (classes,) of classes where two constituents meet more than once, or without a common edge.
 
-        Along a line, each of two constituents has one sector of the surrounding triangles.  Tiles tear only round
-        fibres, which touch nowhere.
+        At an ordinary interface node, each of two constituents fills one sector of the surrounding triangles.  Tiles
+        tear only round fibres, which touch nowhere.
         """
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
@@ -205,7 +205,7 @@ class Torus:
     def nesting(self) -> Int:
         """The position (constituents,) of each constituent in the order from the outermost to the innermost.
 
-        The order follows the distance from the matrix in constituents, then coatings before fibres, then numbers.
+        The distance from the matrix, counted in constituents, comes first; then see `places_by_depth`.
         """
         one, other, _ = self.sides
         a, b = self.constituent[one], self.constituent[other]

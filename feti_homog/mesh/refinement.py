@@ -1,6 +1,6 @@
 """Refine a subdomain uniformly, without communication, and order the nodes for elimination.
 
-Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse vertex,
+Each coarse triangle has a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse vertex,
 the p-th lattice node of a coarse edge, or an inner node of a coarse triangle; arithmetic on coarse numbers
 identifies fine nodes on the torus and between subdomains.
 
@@ -21,9 +21,9 @@ from feti_homog.mesh.periodic_topology import edge_pairs
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Offset of a cut from the middle / triangles of the part, at most.
+# Largest offset of a cut from the middle / number of triangles in the part.
 OFF_THE_MIDDLE = 0.1
-# Intervals a side from which dissection orders the inner nodes of a coarse triangle, too: below, these are few.
+# Fewest intervals a side with which dissection also orders the many inner nodes of a coarse triangle.
 MANY_INTERVALS = 8
 
 
@@ -128,9 +128,9 @@ class FineMesh:
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     """Refine a subdomain, with new nodes of curved edges on the circles and ellipses.
 
-    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the offset of the arc from the chord at
-    s = b_b / (b_a + b_b), and b_o is the coordinate of the opposite vertex.  Mid-edge nodes of quadratic
-    elements are midpoints except on arcs, so that only elements at an arc are curved.
+    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s) with barycentric coordinates b_k: on the edge from a to c, delta
+    is the offset of the arc from the chord at s = b_c / (b_a + b_c), and o is the opposite vertex.  Mid-edge nodes of
+    quadratic elements are midpoints except on arcs, so that only elements at an arc are curved.
     """
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
@@ -165,7 +165,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Concatenate meshes of one lattice, without common nodes."""
+    """Concatenate meshes that have one lattice and no common nodes."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(
@@ -204,7 +204,7 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)
     last[node], first[node[::-1]], place[nodes] = of_leaf, of_leaf[::-1], inside
-    height = np.frexp((first ^ last).astype(float))[1]  # above the leaves, of the smallest part around a node
+    height = np.frexp((first ^ last).astype(float))[1]  # levels from the leaves to the smallest part around a node
     end = (last >> height) + 1 << height
     return np.asarray(np.lexsort((place, height, end)))
 

@@ -12,7 +12,7 @@ from feti_homog.mesh.coarse_mesh import HALVES, on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
-# The arrays of a submesh with a row for each triangle, vertex, plane edge, class and torus edge, but index arrays.
+# The arrays, except index arrays, with a row for each triangle, vertex, plane edge, class and torus edge.
 ROWS = (
     ("constituent",),
     ("points",),
@@ -49,8 +49,8 @@ class Submesh:
         touching: (classes,) as `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
-        pinned: local numbers of the classes that do not move: one against translations of the cell, Eq. (15), or those
-            on its sides.
+        pinned: local numbers of the classes that do not move: one class, against translations of the cell, Eq. (15),
+            or all classes on the cell sides.
         boundary: conditions on the sides, as in `CoarseMesh`.
     """
 
@@ -214,11 +214,10 @@ def halved(pixels: Submesh) -> Submesh:
 
 
 def pinned_classes(torus: Torus) -> Int:
-    """Return the keys of the pinned classes: one of a periodic cell, Eq. (15), or all on sides that move by E x.
+    """Return the keys of the pinned classes: one class, all on sides that move by E x, or none with tractions.
 
-    The one class lies inside the matrix, nearest to a corner of the cell. On an interface, a pinned class would join
-    faces that must be able to part; in a fibre, it would hold the fibre when all bonds are broken.  The choice changes
-    u* by a constant only.
+    The one class of a periodic cell, Eq. (15), lies inside the matrix, nearest to a corner. On an interface, it would
+    join both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts u*.
     """
     if torus.mesh.boundary != "periodic":
         nodes = on_sides(torus.mesh.points[:, None], torus.mesh.period)
@@ -234,8 +233,8 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     """Find the most suitable class for the pin.
 
     Returns:
-        The least triple of unfitness `unfit` (classes,), distance from the nearest cell corner, and key; [] without
-        classes.
+        A list of one triple: `unfit` (classes,) at that class, its distance from the nearest cell corner, and its key;
+        [] without classes.
     """
     mesh = torus.mesh
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period

@@ -16,14 +16,14 @@ from feti_homog.typing import Bool, Float, Int
 
 # Decimals of lengths relative to the cell width in comparisons.
 DECIMALS = 10
-# Decimals of coordinates and sizes that gmsh is given. The last bits differ from machine to machine, and with them gmsh
-# would make other triangles.
+# Decimals of coordinates and sizes passed to gmsh: the last bits differ between machines, and gmsh would make other
+# triangles.
 GMSH_DECIMALS = 12
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 # The largest number of candidate gaps between tangents, and the least ratio of a candidate to the widest gap.
 MOST_GAPS, NARROWEST = 4, 0.7
-# Fibres beside each other have three pairs each; those on top of each other would fill the memory.
+# Limit for pairs of near fibres: about three per fibre, unless many lie on top of each other and fill the memory.
 MOST_PAIRS = 100_000_000
 # Periods from a cell to the neighbouring cells.
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
@@ -97,7 +97,7 @@ class Arrangement:
 
     @property
     def voids(self) -> int:
-        """The void count, including those within hollow fibres."""
+        """The number of voids, including the voids within hollow fibres."""
         return int(self.is_void.sum() + self.is_hollow.sum())
 
     @property
@@ -165,10 +165,10 @@ def clearance(arrangement: Arrangement) -> float:
 def clear_shift(arrangement: Arrangement) -> Arrangement:
     """Shift an arrangement so that no cell side is tangent to an outline.
 
-    The candidates along an axis are the middles of the widest gaps between tangents. Combined, they give corners, of
-    which the one farthest from all outlines is selected. In symmetric cells, for example with two discs, several
-    corners are equal up to rounding errors: the first is selected, so that the length unit does not matter. Corners in
-    voids are excluded (`in_voids`).
+    The candidates along an axis are the middles of the widest gaps between tangents. Two candidates make a corner; the
+    corner farthest from all outlines is selected. In symmetric cells, for example with two discs, several corners are
+    equally far up to rounding errors: the first is selected, so that the length unit does not matter. Corners in voids
+    are excluded (`in_voids`).
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):

@@ -10,9 +10,9 @@ from feti_homog.typing import Float
 
 # Least and largest ratio of gap to radius sum for fibres across the border.
 LEAST_GAP, MOST_GAP = 0.01, 0.05
-# Ratio of overlap to radius sum that counts as no overlap; distances are enlarged by it.
+# Overlap / radius sum that counts as no overlap; required distances are larger by this fraction.
 TOLERANCE = 1e-6
-# Tolerance of the smallest moves, relative to the mean radius.
+# Change of the moves in one step / mean radius, below which the moves are final.
 SETTLED = 1e-4
 MAX_STEPS = 100
 
@@ -21,9 +21,9 @@ def moves(outlines: Outlines, size: Float) -> Float:
     """Compute the moves d (N, 2) that separate outlines across the border of the torus.
 
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2 such that no gap becomes less than
-    the smallest gap within the border. Gaps are relative to the sum of the radii; the smallest gap is limited to
-    LEAST_GAP to MOST_GAP. Each step replaces the distances |v| >= r by n . v >= r, with the present directions n; since
-    n . v <= |v|, its solution keeps the distances.
+    the smallest gap inside the window, which is clipped to the range LEAST_GAP to MOST_GAP. Gaps are relative to the
+    sum of the radii. Each step replaces the constraints |v| >= r by n . v >= r, with the present directions n; since
+    n . v <= |v|, its solution satisfies the constraints.
 
     Other outlines than discs have the radii of equal-area discs; n is the direction of the largest gap
     n . v - r, where r is the sum of both supports along n.

@@ -37,7 +37,7 @@ class FibreTable:
     Attributes:
         name: name of the file or list, for messages.
         row: (N,) line in the file or position in the list, from 1, for messages and results.
-        columns: numbers (N,) of all NUMBERS, by name.
+        columns: name -> numbers (N,), for every name in `table_columns.NUMBERS`.
         given: names of the columns in the table.
         phase: N names, "fibre" by default, "void" for voids.
         width, height: size of the cell; None if the table lacks it.
@@ -151,7 +151,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Build the table of a list of fibres, whose keys are columns; faults count rows from 1.
+    """Build a table from a list of fibres {column: value}; messages number the rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
@@ -188,10 +188,10 @@ def _check_names(
     if not names:
         given = wording.toml_value(", ".join(words))
         ways = 'in [cell] columns = ["x", "y", "radius"]'
-        faults.add(row, f"{given}: expected names of columns, as x, y, radius, here or {ways}")
+        faults.add(row, f"{given}: expected names of columns, such as x, y, radius, here or {ways}")
         faults.throw()
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-        faults.add(row, f"column {name}: there are two of it")
+        faults.add(row, f"column {name}: the name is there twice")
     for word in unread:
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")

@@ -8,7 +8,7 @@ from feti_homog.microstructure.shapes import directions
 from feti_homog.typing import Bool, Float, Int
 
 SMALLEST = 3.0  # radius in pixels
-# Of each fit, the largest distance / radius of an edge from its circle, and the least `_excess` of edges on a circle.
+# For each fit: largest distance of an edge from its circle / radius, and least `_excess` of edges on a circle.
 FITS = (0.2, 0.5), (0.1, 1.0), (0.05, 2.2)
 RIM = directions(np.linspace(0.0, 2 * np.pi, 65))
 
@@ -16,8 +16,8 @@ RIM = directions(np.linspace(0.0, 2 * np.pi, 65))
 def round_fibres(image: Float) -> Float:
     """Find the circles (k, 3), centres and radii in pixels, around round fibres in an image of several grey values.
 
-    Edges are ridges of the slope of filtered grey values, steeper than its root mean square. Fibres are on the side,
-    bright or dark, with more edges on circles. The first row of the image (rows, columns) is the lowest.
+    Edges are ridges in the slope of the filtered grey values, above its root mean square. Fibres are bright or dark,
+    whichever puts more edges on circles. The first row of the image (rows, columns) is the lowest.
     """
     slope = np.stack(np.gradient(gaussian_filter(image, 1.5)))
     steepness = np.hypot(*slope)
@@ -37,7 +37,7 @@ def round_fibres(image: Float) -> Float:
 def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, Float]:
     """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` pixels.
 
-    Returns the part of the edges on circles, and the circles (k, 3).
+    Returns the fraction of the edges that lie on circles, and the circles (k, 3).
     """
     radius, peaks = SMALLEST, [np.zeros((0, 4))]
     while radius < min(size) / 2:
@@ -66,7 +66,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
         owner, error = nearest[place, best], error[place, best]
         is_on = error < np.maximum(reach, 1.0 / circles[owner, 2])
         part, owner = float(is_on.mean()), owner[is_on]
-        # x^2 + y^2 = 2 a x + 2 b y + c about the centre of before, by normal equations.
+        # x^2 + y^2 = 2 a x + 2 b y + c about the previous centre, by normal equations.
         x, y = (edges[is_on] - circles[owner, :2]).T
         rows = np.stack([2 * x, 2 * y, np.ones_like(x)])
         sums = [np.bincount(owner, row, len(circles)) for row in (rows[:, None] * rows).reshape(9, -1)]
@@ -81,7 +81,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return by how many deviations (k,) edges on circles exceed a part `by_chance` of the rims in the image."""
+    """Return by how many deviations (k,) the edges on visible rims exceed the fraction expected `by_chance`."""
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)
@@ -89,7 +89,7 @@ def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chanc
 
 
 def _apart(circles: Float, excess: Float) -> Bool:
-    """Mark circles that overlap no marked circle of larger `excess` (k,) by much."""
+    """Return the mask (k,) of circles that hardly overlap any marked circle with a larger `excess` (k,)."""
     tree, is_apart = cKDTree(circles[:, :2]), np.zeros(len(circles), bool)
     is_covered = np.zeros(len(circles), bool)
     for k in np.argsort(-excess, kind="stable"):

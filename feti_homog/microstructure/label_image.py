@@ -1,4 +1,4 @@
-"""Read images, and label images whose pixels have the number of a phase, as of segmented micrographs."""
+"""Read grey images, and label images, such as segmented micrographs, whose pixels hold phase numbers."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -26,7 +26,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is no image with whole numbers, or differs from `labels`, a line each.
+        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, in a line each.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)
@@ -38,8 +38,8 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
         few = ", ".join(unnamed[:3]) + ", ..." * (len(unnamed) > 3)
         way = ""
         if len(unnamed) > 16:
-            way = "; of grey values or numbers of fibres make labels by a threshold, or fibres --image a table"
-        faults.append(f"[cell] labels: no phase of {few}; {listed}{way}")
+            way = "; turn grey values into labels by a threshold, or into a table by fibres --image"
+        faults.append(f"[cell] labels: no phase for {few}; {listed}{way}")
     for name in sorted(labels.keys() - {*names}):
         faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
     if faults:
@@ -55,7 +55,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
 
 
 def read_image(path: Path, is_grey: bool = False) -> Array:
-    """Return the pixels (rows, columns) in an image file, the upper row first, or with `is_grey` grey values.
+    """Return the pixels (rows, columns) of an image file, the upper row first; with `is_grey`, as grey values.
 
     A separate process decodes the file.
 
@@ -68,7 +68,7 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
         image = image.astype(np.int64)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
         shape, way = "x".join(map(str, image.shape)), "; cut one layer out of a stack" * (image.ndim > 2)
-        expected = f"expected a whole number a pixel, in rows{way}"
+        expected = f"expected one whole number a pixel, in rows{way}"
         raise CaseError(f"{path.name}: {shape} values of type {image.dtype}; {expected}")
     _check_size(path, *image.shape)
     return image.astype(np.uint8) if image.dtype.kind == "b" else image

@@ -145,7 +145,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     retained = np.flatnonzero(first)
     centres = centres[retained]
     outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
-    # Fibres that overlap or touch, in a cut window only within it.
+    # Fibres that overlap or touch; a cut window may have such pairs across the border.
     one, other, gap, together, across = _gaps(table, retained, outer, size)
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
     for k in bad[np.unique(np.stack([one[bad], other[bad]]), axis=1, return_index=True)[1]].tolist():
@@ -177,7 +177,7 @@ def fibre_rows(table: FibreTable, window: str) -> Int:
 def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:
     """Replace images of centres (k, 2) by the centres in the table, plus the moves of a cut window.
 
-    The centres are those of `rows` (k,), by default of all fibres.
+    The centres belong to `rows` (k,), by default to all fibres.
     """
     listed = table.centres[fibre_rows(table, window) if rows is None else rows]
     size = np.array([table.width, table.height], float)

@@ -12,7 +12,7 @@ from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 
-# Neighbours whose distances are matched: nearest and second nearest.
+# Number of neighbours whose distances are matched: the nearest and the second nearest.
 SHELLS = 2
 # Limits of the trial moves: per fibre, and in total.
 MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
@@ -35,9 +35,9 @@ class NearestNeighbours:
         distances: (N, k), in ascending order; infinite if a window has too few fibres.
         directions: (N, k) degrees from x1 towards x2, in [0, 360).
         weights: (N, k), weights of the distances in their distribution; a column has the sum 1.  In a periodic cell
-            weights are 1/N.  In a window a distance d counts if the circle of radius d lies within, so that no fibre
-            outside can be closer.  Its weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984] compensates that
-            fewer long distances count.  A column is zero if none of its distances counts.
+            weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
+            that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]
+            compensates that fewer long distances count.  A column is zero if none of its distances counts.
     """
 
     distances: Float
@@ -206,7 +206,7 @@ def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Place the fibres of a pattern at random, with a distance of at least `gap`.
+    """Place the fibres of a pattern at random, with gaps of at least `gap`.
 
     Raises MeshError if the search finds no such pattern.
     """

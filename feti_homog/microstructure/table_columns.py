@@ -35,15 +35,15 @@ MAX_BYTES = 1 << 26
 EMPTY = " \t\r,;"
 """Characters of a line without cells, as Excel writes them below a table."""
 SEPARATOR = re.compile(r"sep=[,;\t]?")
-"""First line that Excel reads."""
+"""A first line that tells Excel the separator."""
 UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
-"""Micro, degree and square in its code pages of Western Europe."""
+"""The signs of micro, degree and square in Excel's Western European code pages."""
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Yield the lines of a text file without comments.
+    """Yield number, content and comment of each line in a text file.
 
-    A line is its number from 1, its content or an empty string, and the comment behind "#".
+    Numbers begin at 1; the content is "" for a line without cells; the comment is the text behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is not text.
@@ -81,7 +81,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
     """Return the fault of a row whose number of cells is not `count`, or an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
-    return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, as there are names"
+    return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
@@ -90,7 +90,7 @@ ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
 AXES_OF_PICTURES = {"major", MATLABS_AXIS}
-"""Major axes of tables whose angles count as in pictures, where y points down."""
+"""Names of major axes in tables whose y points down, but whose angles are counter-clockwise in the picture."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
@@ -99,8 +99,8 @@ def _half(value: float) -> float:
     return value / 2
 
 
-# Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
-# axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
+# Other names of a column (former entries take precedence), the column, and the conversion of values. Major and Minor,
+# ImageJ's axes, make an area superfluous; MATLAB's Centroid_1 is x, centroid-0 of scikit-image is the row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
     (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1", "col", "column"), "x", float),
     (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0", "row"), "y", float),
@@ -142,7 +142,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
     if MATLABS_AXIS in bare:
         # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
-    # An angle is measured as a picture is seen, for coordinates whose y points down.
+    # Where y points down, angles are still measured as the picture is seen.
     values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
     columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:

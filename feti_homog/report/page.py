@@ -26,7 +26,7 @@ PICTURES = {
     **{f"case_dT_dx{k}": f"Flux and isotherms under a unit gradient along x{k}" for k in (1, 2)},
     "angle": "Response against the debonding angle",
     "angle_states": "Deformed cell at several angles",
-    "path": "Response along the path of load",
+    "path": "Response along the load path",
     "path_states": "Deformed cell along the path",
     "energy": "Energies along the path",
     "load": "Deformed cell under the load",

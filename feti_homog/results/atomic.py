@@ -80,7 +80,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files of killed writers; on any machine if this process writes `alone`."""
+    """Remove unfinished files of killed writers: of any machine if this process writes `alone`."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):

@@ -107,7 +107,7 @@ class Checkpoint(EventsInMemory):
     """A store of events in the file `directory`/checkpoint/events, which rank 0 writes.
 
     Attributes:
-        signature: a line of case, subdomains and ranks, required to resume, and the text of entries of result.json.
+        signature: a line with case, subdomains and ranks, which must agree to resume; then entries of result.json.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
@@ -267,7 +267,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Remove the checkpoint folder, after a renaming: no run finds a partial folder.  Call on one rank.
+    """Rename the checkpoint folder, then remove it, so that no run finds a partial folder.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.

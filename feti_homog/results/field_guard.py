@@ -14,7 +14,7 @@ from feti_homog.results import field_layout, result_json
 from feti_homog.system.runtime import input_files, records
 
 ATTRIBUTES = {str: "text", tuple[str, ...]: "text", int: "int64"}
-# Least and largest numbers, the latter as the last of n nodes, m elements, k interface nodes, f fibres, p phases.
+# Least and largest numbers; letters stand for the last of n nodes, m elements, k interface nodes, f fibres, p phases.
 RANGES: dict[str, tuple[float, float | str]] = {
     **dict.fromkeys(("triangles", "fibre_node", "matrix_node"), (0, "n")), "vertex": (0, "k"), "phase": (0, "p"),
     **dict.fromkeys(("body", "subdomain", "fibre"), (0, "m")), "rank": (0, 1 << 20), "fibre_number": (0, "f"),
@@ -28,8 +28,8 @@ MAY_BE_NAN = ("centre", "radius", "stress_33", "mesh_error")
 def require_own(path: Path, state: int | None = None) -> None:
     """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
-    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or in the one
-    given.  A child process reads the file, on which HDF5 may crash.  Raises CaseError; FetiHomogError if unreadable.
+    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or in `state`.
+    A child process reads the file, because HDF5 may crash on it.  Raises CaseError; FetiHomogError if unreadable.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
@@ -62,7 +62,7 @@ def require_tables(path: Path, state: int | None) -> None:
             for group, view in field_layout.views_of(file):
                 entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
                 shape = (len(original), view.components) if view.components else (len(original),)
-                entry[:1]  # which finds the sources
+                entry[:1]  # reading finds the sources
                 if (entry.shape, entry.dtype, entry.is_virtual, entry.fillvalue) != (shape, original.dtype, True, 0):
                     raise CaseError(f"cannot read {path}: /{view.path(group)} is no view of {original.name}")
     except (AttributeError, OSError, RuntimeError, LookupError, TypeError, ValueError) as error:
@@ -133,7 +133,7 @@ def _require_mesh(path: Path, file: Any) -> None:
         (np.isin(file["fibre/body"], file["mesh/body"]).all(), "a fibre has no elements"),
         ((np.abs(gap - size * np.round(gap / size)) <= 1e-5 * size.max()).all(), "interface nodes are not in the mesh"),
         (all({phase, phase.partition(":")[0]} & {*case["material"]} for phase in phases), "its case has other phases"),
-        (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name has other letters"),
+        (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name is not printable"),
     ):
         if not holds:
             raise CaseError(f"cannot read {path}: {fault}")

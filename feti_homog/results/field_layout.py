@@ -27,7 +27,7 @@ class Header:
     width: float = described("width of the cell", records.LENGTH)
     height: float = described("height of the cell", records.LENGTH)
     order: int = described("order of the elements: 1, or 2 with curved sides at interfaces")
-    refine: int = described("times that every triangle of the coarse mesh was cut in four")
+    refine: int = described("how often every triangle of the coarse mesh was cut in four")
     phases: tuple[str, ...] = described("names of the phases", shape="(p,)")
     length_unit: str = described("label of the unit of lengths, may be empty", default="")
     stress_unit: str = described("label of the unit of stresses, may be empty", default="")
@@ -44,19 +44,19 @@ class MeshPart:
 
     points: Float = described("positions of the nodes", records.LENGTH, "(n, 2)")
     triangles: AnyInt = described(
-        "nodes of the elements, from 0: vertices, then of order 2 the mid-side nodes 01, 12, 20",
+        "nodes of the elements, from 0: vertices, then, for order 2, the mid-side nodes 01, 12, 20",
         shape="(m, 3 or 6)", dtype="int64",
     )  # fmt: skip
     body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
     subdomain: AnyInt = described(
-        "subdomain of each element, from 0; of one across materials each part in one body has a number of its own",
+        "subdomain of each element, from 0; if subdomains extend across materials, each part in one body has a number",
         shape="(m,)",
         dtype="int32",
     )
     rank: AnyInt = described("rank that computed each element, from 0", shape="(m,)", dtype="int32")
     phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
     fibre_number: AnyInt = described(
-        "number of the fibre, also of its coating, from 1; 0 in the matrix", shape="(m,)", dtype="int32"
+        "number of the fibre, from 1, in the fibre and its coating; 0 in the matrix", shape="(m,)", dtype="int32"
     )
 
 
@@ -68,12 +68,12 @@ class FibrePart:
     body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
     phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
     centre: Float = described(
-        "centre of the circle, within the cell, or of the area of a fibre that is not round; NaN if it winds around",
+        "centre of the circle, in the cell, or area centroid of a fibre that is not round; NaN if it winds around",
         records.LENGTH,
         "(f, 2)",
     )
-    radius: Float = described("radius; NaN of a fibre that is not round", records.LENGTH, "(f,)")
-    strength: Float = described("strength of the bonds of the fibre / that of [interface]", shape="(f,)")
+    radius: Float = described("radius; NaN for a fibre that is not round", records.LENGTH, "(f,)")
+    strength: Float = described("strength of the fibre's bonds / strength in [interface]", shape="(f,)")
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ class InterfacePart:
     length: Float = described("tributary length: interface length that a node represents", records.LENGTH, "(k,)")
     fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
-    pair: AnyInt = described("place, from 0, of its section in the case's [[interface]]", shape="(k,)", dtype="int32")
+    pair: AnyInt = described("index, from 0, of the node's section [[interface]]", shape="(k,)", dtype="int32")
     fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
-    vertex: AnyInt = described("number of the interface node, from 0: viewers' elements", shape="(k, 1)", dtype="int64")
+    vertex: AnyInt = described("the interface node, from 0, as an element for viewers", shape="(k, 1)", dtype="int64")
     matrix_node: AnyInt = described(
-        "a node of the mesh on the matrix's face, from 0, where `fibre_node` is or an image of it by the periods",
+        "a node of the mesh on the matrix's face, from 0, at the place of `fibre_node` or at a periodic image of it",
         shape="(k,)",
         dtype="int64",
     )
@@ -101,11 +101,11 @@ class StatePart:
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
     stress_mean: Float = described(f"mean stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress")
-    load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
-    point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
-    label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
+    load_factor: float = described("position on the path, 0 to 1; 1 for other analyses")
+    point: int = described("number, from 0, of the state's point in `path` or `angle` of result.json; else 0")
+    label: str = described("label of the state, such as `E11`, `60 deg E11`, `event 12`")
     displacement: Float = described(
-        "displacement, including that of the macroscopic strain, E x from the lower left corner",
+        "displacement, including the displacement E x of the macroscopic strain, x from the lower left corner",
         records.LENGTH,
         "(n, 2)",
     )
@@ -116,7 +116,7 @@ class StatePart:
         "(m,)",
     )
     mesh_error: Float32 = described(
-        "estimated error of the strain energy that is in each element / the strain energy of the cell; NaN without "
+        "share of each element in the estimated error of the strain energy / strain energy of the cell; NaN without "
         "`mesh_error` in [output]",
         shape="(m,)",
         dtype="float32",
@@ -127,8 +127,8 @@ class StatePart:
         records.LENGTH,
         "(k, 2)",
     )
-    traction_vector: Float = described("`traction` as (x, y, z), in x3 `axial_traction` or 0", records.STRESS, "(k, 3)")
-    jump_vector: Float = described("`jump` as (x, y, z), along x3 `axial_jump` or 0", records.LENGTH, "(k, 3)")
+    traction_vector: Float = described("`traction` as (x, y, z), z `axial_traction` or 0", records.STRESS, "(k, 3)")
+    jump_vector: Float = described("`jump` as (x, y, z), z `axial_jump` or 0", records.LENGTH, "(k, 3)")
     displacement_fibre: Float = described("displacement (x, y, z) of the fibre's face", records.LENGTH, "(k, 3)")
     displacement_matrix: Float = described(
         "displacement (x, y, z) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
@@ -138,7 +138,7 @@ class StatePart:
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
     damage: Float = described("damage of bonds: 0 intact, 1 broken; between only by laws that soften", shape="(k,)")
     sliding: AnyInt = described(
-        "sign of the growing slip of faces that slide with friction; 0 of others, closed ones of which stick",
+        "sign of the growing slip where faces slide with friction; 0 elsewhere, where closed faces stick",
         shape="(k,)",
         dtype="int8",
     )
@@ -178,7 +178,7 @@ class SpatialStatePart(StatePart):
     temperature: float = described("change of temperature", "temperature")
     stress_33: Float = described("stress 33, along the fibres", records.STRESS, "(m,)")
     axial_displacement: Float = described(
-        "displacement along x3 at x3 = 0, that of the macroscopic strain included", records.LENGTH, "(n,)"
+        "displacement along x3 at x3 = 0, including that of the macroscopic strain", records.LENGTH, "(n,)"
     )
     axial_stress: Float = described(f"element means, {', '.join(voigt.AXIAL_STRESSES)}", records.STRESS, "(m, 2)")
     axial_traction: Float = described("sigma n along x3", records.STRESS, "(k,)")

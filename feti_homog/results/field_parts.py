@@ -91,9 +91,9 @@ def state_parts(
     point: int,
     fields: recovered_fields.RecoveredFields,
 ) -> Iterator[StatePart]:
-    """Yield the recovered `fields` of each state, from the response, or None, in each problem.  Collective.
+    """Yield the part of each state, from its responses in all problems and the recovered `fields`.  Collective.
 
-    A problem without a response has zero fields.  Conduction takes the place of the axial problem.
+    A problem whose response is None has zero fields.  Conduction takes the place of the axial problem.
 
     Raises:
         ValueError: a state has no response.

@@ -1,4 +1,4 @@
-"""Find the path landmarks, and choose the points to keep and to show.
+"""Find the path landmarks, and choose the points to store and to show.
 
 Landmarks are first softening, first break, peak, valley after the peak, and end.  The peak is the largest stress before
 a fall, in the component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path,
@@ -155,7 +155,7 @@ Drop = tuple[float, int, int]
 
 
 def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
-    """Return the rising numbers of the points to keep.
+    """Return the rising numbers of the points whose fields are stored.
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
@@ -242,7 +242,7 @@ def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | Non
 
 
 def kept_points(document: path_curves.Document) -> list[int]:
-    """Return the points with kept fields, in state order; all points if no fields are kept."""
+    """Return the points with stored fields, in state order; all points if no fields are stored."""
     return list(document.get("states") or range(len(document["path"])))
 
 

@@ -229,7 +229,7 @@ def write_product(path: Path, text: str) -> Path:
         raise CaseError(f"--out {path}: expected a file, but it is {kind}")
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise CaseError(f"--out {path}: expected a file in a folder that there is")
+        raise CaseError(f"--out {path}: expected a file in an existing folder")
     if RESULT_FILE.fullmatch(path.name) or RESULT_FILE.fullmatch(target.name):
         raise CaseError(f"--out {path}: expected another name; results have files of that name")
     atomic.remove_unfinished(target.parent, re.compile(re.escape(target.name)), alone=False)

@@ -56,7 +56,7 @@ def changed_components(document: Document) -> list[int]:
 def leading_component(document: Document) -> int:
     """Return the component with the largest strain up to the end of the leg on which damage begins.
 
-    Components that the waypoints change are compared, all if they change only the temperature.
+    Only components that the waypoints change are compared, or all components if only the temperature changes.
     """
     largest = np.abs([point["strain"] for point in leading_points(document, ("broke", "softened"))]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
@@ -64,13 +64,13 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the leg on which bonds first have `counts`; all points without."""
+    """Return the points up to the end of the first leg with bonds in `counts`; all points without such a leg."""
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield leg, component and point of the largest stress on later legs, where the strain changes most."""
+    """Yield, for each later leg: number, component whose strain changes most, point of its largest stress."""
     leg, changed = legs_of(document), changed_components(document)
     strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
     for number in range(2, legs(document) + 1):

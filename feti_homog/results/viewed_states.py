@@ -32,7 +32,7 @@ class ViewedState:
         points: (n, 3) node positions; nodes are torn between subdomains.
         cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
-        means: one row (1, c) of each of load_factor, temperature, mean_strain, mean_stress, as `xdmf.cell_means`.
+        means: load_factor, temperature, mean_strain and mean_stress, each a row (1, c), from `xdmf.cell_means`.
         label: state label.
     """
 
@@ -121,8 +121,8 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
     """Write the states of `directory`/result.h5 in a VTK format; return the paths.  Call on one rank.
 
     `kind` is one of `FORMATS`.  `vtu` writes cell_0000.vtu, ... and their list cell.pvd; `vtkhdf` writes cell.vtkhdf,
-    with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.  Times
-    are numbers of states, which rise where load factors snap back; these and the means are field data.
+    with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.  The
+    time of a state is its number, since load factors may snap back; load factors and means are field data.
 
     Raises:
         CaseError: result.h5 is missing.

@@ -47,8 +47,8 @@ class Axis:
 def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
     """Read the points and settings of a table [sweep].
 
-    A point is a value for every key that varies.  In a grid the last key in the file runs fastest; all sampled keys
-    together are the last axis.  A faulty table has no points; a line for each fault is appended to `faults`.
+    A point is a value for every key that varies.  In a grid the last key in the file varies fastest; all sampled keys
+    together are the last axis.  A faulty table gives no points; a line for each fault is appended to `faults`.
     """
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
@@ -128,7 +128,7 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
     if not (types.is_number(low) and types.is_number(high) and low < high):
         return f"expected numbers from < to{types.magnitudes_in_words([low, high])}"
     if scale not in ("linear", "log") or (scale == "log" and low <= 0):
-        return 'expected scale = "linear" or "log", this from a number above 0'
+        return 'expected scale = "linear", or "log" from a number above 0'
     step, count = value.get("step"), value.get("count")
     if step is not None and count is not None:
         return "step, count: exclude each other; give one"

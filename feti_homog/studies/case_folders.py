@@ -3,7 +3,7 @@
 DIR/sweep.json, cases.csv     the cases; `feti-homog collect` adds the results to cases.csv
 DIR/case-0001/case.toml       the case with its defaults, as `feti-homog run` reads it
 DIR/case-0001/result.json     the result, as of a single run
-DIR/case-0001/error.txt       the reason of a failure
+DIR/case-0001/error.txt       the reason for a failure
 """
 
 import contextlib
@@ -77,7 +77,7 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Refuse a folder of another study, or with foreign files under names that a study would write.  On one rank.
+    """Refuse a folder with another study, or with foreign files under names that a study writes.  On one rank.
 
     Raises:
         CaseError: the document of a study is there, or such a file or subfolder is not empty.
@@ -92,7 +92,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 @contextlib.contextmanager
 def document_lock(directory: Path) -> Iterator[None]:
-    """Exclude other studies while one writes its document; raise CaseError if one lasts for long.  On one rank."""
+    """Lock the document of a study during a block; raise CaseError if the lock stays held.  On one rank."""
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:
         try:

@@ -45,8 +45,8 @@ def run_all(
 ) -> None:
     """Run all sweep cases.  Collective.
 
-    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  Unless `quiet`, the
-    first one shows the progress, with lines about cases if not None.
+    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `quiet` True
+    nothing is printed; with None the first group shows the progress; with False it also prints a line for each case.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
@@ -76,7 +76,7 @@ def run_all(
     if comm.rank == 0 and quiet is False:
         done, first = sum(state.status is case_folders.Status.DONE for state in states), dict[str, str]()
         for entry, state in zip(sweep.entries, states, strict=True):
-            for line in (state.document or {}).get("warnings", ()):  # one of each setting, which stands before a colon
+            for line in (state.document or {}).get("warnings", ()):  # one for each setting, the text before the colon
                 first.setdefault(line.partition(": ")[0], f"warning: {entry.folder}: {line}")
         standard_streams.say("\n".join([*first.values(), f"{done} of {len(states)} cases done in {directory}"]))
     if failed:
@@ -86,7 +86,7 @@ def run_all(
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
-    """Run the case of a sweep with a number, from 1, on all ranks.  Collective.
+    """Run the sweep case `number`, from 1, on all ranks.  Collective.
 
     Other jobs may run other cases of the sweep at the same time.
 

@@ -1,4 +1,4 @@
-"""Write the tables and the sweep picture, finished or not, for `feti-homog collect DIR`."""
+"""Write the tables and the picture of a sweep, finished or not, for `feti-homog collect DIR`."""
 
 import json
 import math
@@ -28,7 +28,7 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write the tables and the sweep picture to its folder.  On one rank.  Returns the lines to print.
+    """Write the tables and the picture of a sweep to its folder; return the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
@@ -55,7 +55,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return tables of peaks or constants: means over realisations with their scatter, or the values of points."""
+    """Return printed tables of peaks or constants: means and scatter over realisations, or values at points."""
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names

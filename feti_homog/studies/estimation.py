@@ -1,4 +1,4 @@
-"""Estimate unknowns by weighted least squares, with covariances and undetermined directions; content of fit.json.
+"""Estimate unknowns by weighted least squares, with covariances and undetermined directions; fill fit.json.
 
 Data y have independent errors with standard deviations s, so that residuals are r_i = (f_i(x) - y_i) / s_i.  With
 J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covariance is (J^T J)^-1.
@@ -18,10 +18,10 @@ from feti_homog.typing import Array, Float
 
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
-LEAST_CHANCE = 1e-3  # of residuals as large, below which the model is refused
+LEAST_CHANCE = 1e-3  # probability of equally large residuals, below which the model is refused
 # The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
-STEP, MOST_EVALUATIONS = 1e-5, 60  # of the unknowns, far below 1 % differences and std
+STEP, MOST_EVALUATIONS = 1e-5, 60  # the relative step that ends the search is far below 1 % differences and std
 Model = Callable[[Float], Float]
 
 
@@ -32,9 +32,9 @@ class ParameterEstimates:
     Attributes:
         x: (n,) estimates.
         computed, residuals: (m,) f(x) and (f(x) - y) / s.
-        jacobian: (m, n) of the residuals.
+        jacobian: (m, n) derivatives of the residuals.
         at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
-        singular_values: (n,) of the Jacobian for unknowns relative to their estimates.
+        singular_values: (n,) of the Jacobian by relative unknowns, x / estimate.
         directions: (n, n) right singular vectors of the same Jacobian, in rows.
         evaluations: number of evaluations of f.
         converged: whether the search reached a minimum.
@@ -100,7 +100,7 @@ class ParameterEstimates:
 
     @property
     def chance(self) -> float | None:
-        """The probability of residuals as large under a correct model; None without degrees of freedom."""
+        """The probability of equally large residuals under a correct model; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
@@ -115,8 +115,8 @@ def estimate(
 ) -> ParameterEstimates:
     """Estimate unknowns within bounds from measured data.
 
-    The search is a dogleg in the box of the bounds.  If the data do not determine all directions, it is a trust-region
-    method, whose steps have no component along an undetermined direction.
+    The search takes dogleg steps in the box of the bounds.  If the data do not determine all directions, a trust-region
+    method searches instead, whose steps have no component along an undetermined direction.
 
     Args:
         model: computes the values (m,) at unknowns (n,).

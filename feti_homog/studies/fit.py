@@ -28,8 +28,8 @@ from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
-STARTS = 12  # with the given one; tests/parallel/test_fit.py has a cohesive law that needs further ones
-DIFFERENCE = 0.01  # step relative to the value, or to the width of its bounds at 0; a small one sees the mesh
+STARTS = 12  # including the given start; tests/parallel/test_fit.py has a cohesive law that needs further starts
+DIFFERENCE = 0.01  # step / value, or / width of the bounds for a value of 0; smaller steps would see mesh noise
 Point = tuple[float, ...]
 
 
@@ -64,7 +64,7 @@ class Fit(Study):
         """
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict the output to numbers, and derivatives but for debonded faces that may touch."""
+            """Restrict the output to numbers, with derivatives unless debonded faces may touch."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None
@@ -140,9 +140,9 @@ class Evaluations:
     Rank 0 runs the search and asks for evaluations; all ranks compute.
 
     Attributes:
-        answers: on rank 0 result.json of all tests by unknowns, without evaluations that failed.
-        folders: on rank 0 the names of the folders by unknowns, in the order of the evaluations.
-        computed: on rank 0 the computed data (m,) by unknowns, also at the ends of differences.
+        answers: on rank 0, unknowns -> result.json of all tests, without failed evaluations.
+        folders: on rank 0, unknowns -> folder name, in the order of the evaluations.
+        computed: on rank 0, unknowns -> computed data (m,), also for the cases of finite differences.
     """
 
     fit: Fit
@@ -214,8 +214,8 @@ class Evaluations:
     def jacobian(self, x: Float) -> Float:
         """Return the derivatives (m, n) of the data at x (n,), if necessary by finite differences.  On rank 0.
 
-        A softening law with few teeth may keep all data constant: then a side of a difference is computed again with
-        twice the step, up to a tenth of the width of its bounds.
+        With a softening law of few teeth, a step may change no datum: that side of the difference is then computed
+        again with twice the step, up to a tenth of the width of the bounds.
         """
         key, centre = _rounded(x), self.values(x)
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))

@@ -142,7 +142,7 @@ class FitReader:
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
-        """Read a table to a dataclass; a faulty table gives None."""
+        """Read a table into a dataclass; return None for a faulty table."""
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None
@@ -166,7 +166,7 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
     names = voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES
     strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
     if (len(strains), len(stresses)) != (1, 1):
-        raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
+        raise CaseError(f"{path}: expected one column of a strain, such as E11, and one of a stress, such as S11")
     if not 1 < len(lines) <= types.MOST_ROWS + 1:
         raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {types.MOST_ROWS}")
     rows = list[tuple[float, float]]()

@@ -116,7 +116,7 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
 def _phases(document: Document) -> dict[str, float]:
     """Return the largest stresses of the phases by column name.
 
-    Columns belong to a load, but for angles and paths to the largest stress of all states.
+    Each column is for one load; for angles and paths, it has the largest stress of all states.
     """
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
     for phase in document.get("phase_stresses", ()):
@@ -144,24 +144,24 @@ CASE_COLUMNS = (
 INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}
 OUTPUT_COLUMNS = (
-    Column("fraction_meshed", "", "share of all fibres in the meshed area"),
-    Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
-    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
-    Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
+    Column("fraction_meshed", "", "area of all fibres / meshed area"),
+    Column("fraction_PHASE", "", "area of a phase / meshed area, if there are phases besides matrix and fibre"),
+    Column("porosity", "", "area of the voids / area of the cell, if there are voids"),
+    Column("match_distance", "", "with `match`: distance of the cell from the table, in mean diameters"),
     Column("refine", "", "halvings of the mesh"),
     Column("elements", "", "triangles of the refined mesh"),
-    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain; depends on ranks"),
     Column("ranks", "", "MPI ranks"),
-    Column("subdomains", "", "subdomains that the bodies are cut into"),
+    Column("subdomains", "", "number of subdomains"),
     Column("dofs", "", "degrees of freedom of all subdomains"),
     Column("multipliers", "", "Lagrange multipliers of the dual problem"),
     Column("iterations", "", "Krylov iterations of all states"),
-    Column("Cij", records.STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
+    Column("Cij", records.STRESS, "entry of L^ef; if the sweep has generalized plane strain, C66 is the shear modulus"),
     Column("kij", "conductivity", "entry of k^ef, with x3 along the fibres"),
-    Column("Cij_compression", records.STRESS, "the same under minus the unit strains, with contact"),
-    Column("thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
-    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
-    Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
+    Column("Cij_compression", records.STRESS, "Cij under the negative unit strains, with contact"),
+    Column("thermal_Sij", f"{records.STRESS} per unit of temperature", "stress per unit of temperature at zero strain"),
+    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at zero stress; or along x2"),
+    Column("expansion_STRAIN", "1 / temperature", "shear strain per unit of temperature at zero stress"),
     Column("anisotropy_normal", records.STRESS, "C11 - C22"),
     Column("anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; in generalized plane strain C66 - ..."),
     *result_json.columns(engineering_constants.Moduli),
@@ -171,16 +171,16 @@ OUTPUT_COLUMNS = (
         if column.name not in MODULI
     ),
     *result_json.columns(engineering_constants.TransverseIsotropy),
-    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
-    Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
+    Column("NAME_mesh_error", "that of NAME", "estimated mesh error of an entry or constant"),
+    Column("energy_mesh_error", "", "largest estimated relative error of the strain energy under any strain"),
     Column("Cii_reuss", records.STRESS, "lower bound of Cii"),
     Column("Cii_voigt", records.STRESS, "upper bound of Cii"),
     Column("bulk_lower", records.STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
     Column("bulk_upper", records.STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
     Column("shear_lower", records.STRESS, "lower bound of shear, by Hashin and Shtrikman"),
     Column("shear_upper", records.STRESS, "upper bound of shear, by Hashin and Shtrikman"),
-    Column("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of that many degrees"),
-    Column("angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of that many degrees"),
+    Column("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of ANGLE degrees"),
+    Column("angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of ANGLE degrees"),
     Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
     Column("dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"),
     Column("work", records.STRESS, "work of the loads along a path, per area of the cell"),
@@ -189,22 +189,22 @@ OUTPUT_COLUMNS = (
     Column(
         "peak_Sij",
         records.STRESS,
-        "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
-        "`peak` has it",
+        "largest stress of a path in magnitude, with its sign, even if the path ends before the stress falls; for the "
+        "component whose strain leads, the stress of `peak`",
     ),
-    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
+    Column("peak_STRAIN", "", "strain at the peak, for the component whose strain leads"),
     Column("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),
     Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
     Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
     Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
-    Column("load_Sij", records.STRESS, "macroscopic stress under it"),
-    Column("load_stored", records.STRESS, "elastic energy stored under it, per area of the cell"),
-    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
+    Column("load_Sij", records.STRESS, "macroscopic stress under this load"),
+    Column("load_stored", records.STRESS, "elastic energy stored under this load, per area of the cell"),
+    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under this load"),
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
-    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest load at onset, if every direction has an onset"),
     *(
-        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} of each load that has a name")
+        Column(f"PHASE_{name}", unit, f"largest {words} of a phase; LOAD_PHASE_{name} for a named load")
         for name, unit, words in (
             ("principal", records.STRESS, "principal stress"),
             ("von_mises", records.STRESS, "von Mises stress"),
@@ -219,7 +219,7 @@ OUTPUT_COLUMNS = (
 
 
 def named(word: str) -> list[str]:
-    """Describe entries of result.json by their name, and columns of cases.csv by one that they stand for, as C11."""
+    """Describe entries of result.json and columns of cases.csv with the name `word`, such as C11 for Cij."""
     entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
     lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
     for column in OUTPUT_COLUMNS:
@@ -234,9 +234,9 @@ STATISTICS_COLUMNS = (
     Column("point", "", "number of the point, from 1"),
     *INPUT_COLUMNS,
     Column("output", "", "name of a column of cases.csv"),
-    Column("unit", "", "its unit"),
-    Column("count", "", "finished realisations of the point that have it"),
-    Column("mean", "that of the output", "mean over them"),
-    Column("std", "that of the output", "standard deviation, from two on"),
+    Column("unit", "", "unit of the output"),
+    Column("count", "", "finished realisations of the point that have the output"),
+    Column("mean", "that of the output", "mean over these realisations"),
+    Column("std", "that of the output", "standard deviation over two or more realisations"),
     Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
 )

@@ -39,7 +39,7 @@ NAMES = {
 
 
 def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw the moduli of a sweep over fibre fractions to moduli.png.  Returns its path, if any.  On one rank."""
+    """Draw the moduli of a sweep over fibre fractions; return the path of moduli.png, if any.  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
     with mpl.rc_context(plot_helpers.STYLE):

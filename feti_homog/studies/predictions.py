@@ -26,7 +26,7 @@ class Datum:
         test: number of the test, from 0.
         name: name of the value, or of the stress component of a curve.
         value: the measurement, in the unit of the computed value.
-        std: its standard deviation.
+        std: standard deviation of the measurement.
         strain: strain at a point of a curve, else None.
         strain_name: component of the strain.
     """

@@ -124,7 +124,7 @@ def cases_at(
         raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
     entries, parsed = zip(*checked, strict=True)
     if len({case.output.stress_unit for case in parsed}) > 1:
-        raise CaseError("[output] stress_unit: expected the same in all cases, for they share their tables")
+        raise CaseError("[output] stress_unit: expected the same in all cases, which share the tables")
     return Sweep(name, entries, parsed)
 
 
@@ -158,7 +158,7 @@ def case_documents(
         faults.append(f'[{sections.SWEEP}] realisations: only cells with geometry = "random" have several')
     keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
     if realisations is not None and "cell.seed" in keys:
-        faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
+        faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed; seeds count up from the seed in [cell]")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
     ordered = list[tuple[SweepCase, dict[str, Any]]]()
     for realisation in range(1, (realisations or 1) + 1) if not faults else ():

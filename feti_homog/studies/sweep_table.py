@@ -48,8 +48,8 @@ class SweepTable:
     Attributes:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
-        inputs: by dotted key the value of each case, None if the key does not vary in the case.
-        outputs: by name the values (cases,), NaN for cases without the output; for unfinished paths, values so far.
+        inputs: value of each case by dotted key, None if the key does not vary in the case.
+        outputs: values (cases,) by name, NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
     """
 
@@ -90,7 +90,7 @@ class SweepTable:
 
     @property
     def stated(self) -> list[str]:
-        """The outputs with statistics for readers: neither times, memory and checks, nor zero in all cases."""
+        """The names of all outputs except times, memory, checks, and outputs that are zero in all cases."""
         names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
         return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 

@@ -45,13 +45,13 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] of a document whose numbers are the means."""
+        """Return the section [uncertainty] for a document whose numbers are the means."""
         pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers from a document, in which their means remain."""
+    """Extract the uncertain numbers from a document; the means remain in the document."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY

@@ -24,9 +24,9 @@ NUMBERS = {
 
 
 class BondLaw(ABC):
-    """The law of k bonds; numbers of its `section` [[interface]] are scalars or (k,).
+    """The law of k bonds; numbers in its `section`, an [[interface]], are scalars or (k,).
 
-    If `has_toughness`, a break takes the energy `lost`; if `has_tips`, result.json has energies at crack tips.
+    If `has_toughness`, a break dissipates the energy `lost`; if `has_tips`, result.json has energies at crack tips.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -148,9 +148,9 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Return the bond law at p of the k interface nodes.
+    """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,) belongs to all nodes.  With several sections or scattered strengths, the numbers of the law are (p,).
+    `damage` (k,) has all nodes.  With several sections or scattered strengths, the numbers of the law are (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -164,7 +164,7 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
 
 
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """Return the friction coefficients (k,): of debonded faces, or `on_damage` of damaged bonds."""
+    """Return the friction coefficients (k,) of debonded faces, or, if `on_damage`, of damaged bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])

@@ -12,8 +12,8 @@ from feti_homog.verify.reading import Status
 RTOL = 1e-8  # default tolerance of the dual problems
 DIRECTIONS = 720  # number of directions across the fibres in half a turn
 SECTIONS = "moduli", "constants", "transversely_isotropic", "transverse_moduli"
-NOISE = 1e-3  # bound of noise: for a constant, relative to the largest of its kind; for Poisson's ratios, absolute
-# Beginnings of names of constants whose scale is at least 1.
+NOISE = 1e-3  # bound of noise: absolute for Poisson's ratios, else relative to the largest constant of the kind
+# Constants with these beginnings of names have a scale of at least 1.
 RATIOS = ("eta", "anisotropy", "deviation")
 
 
@@ -120,7 +120,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
     Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """
-    # By way of unit diagonals, beside which stiff directions do not round others off.
+    # Scaled to a unit diagonal, so that stiff directions do not round off the others.
     n, voigt, sizes = len(C), VOIGT[len(C)], np.sqrt(np.outer(C.diagonal(), C.diagonal()))
     S = np.linalg.inv(C / sizes) / sizes
     pairs, shears = [(0, 1), (1, 0)], {"G12": 2}

@@ -62,8 +62,8 @@ def targets(case: Document) -> list[Prescribed]:
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
     """Yield the prescribed load at every point of a path.
 
-    The first leg starts at 0, a later leg at the end of the leg before; both are straight.  A component that changes
-    between strain and stress starts at its value in the last point.
+    A leg is straight, from the end of the previous leg, or from 0, to its waypoint.  A component that changes between
+    strain and stress starts at its value in the last point.
     """
     ends, leg, ended = targets(case), 0, False
     by_events = case["path"]["method"] == "events"
@@ -89,7 +89,7 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state with cohesive tractions but without `FIELDS`, which only one state at a time keeps in memory.
+    """A state with cohesive tractions but without the large `FIELDS`, which are in memory for one state at a time.
 
     Attributes:
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 with all springs, and only in springs.

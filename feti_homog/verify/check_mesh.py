@@ -17,7 +17,7 @@ from feti_homog.verify.findings import ROUNDING, Findings, Section
 from feti_homog.verify.reading import COATING, State, Status
 from feti_homog.verify.torus import from_centre
 
-# Largest distance in degrees between the tip of an arc and its mesh node; nodes within it are on neither side.
+# Largest distance in degrees between the tip of an arc and its mesh node; nodes this near are on neither side.
 AT_TIP = 0.06
 # Largest errors of lengths and normals if straight sides replace unknown curves, which turn by at most half a turn.
 LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
@@ -217,7 +217,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check the elements' errors by a second estimate under unit loads, and the energy's error by their sum."""
+    """Check element errors by a second estimate under unit loads, and the energy error by the sum of element errors."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")
@@ -240,7 +240,7 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
-        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at r."""
+        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at the points `r`."""
         free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
             yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))

@@ -74,7 +74,7 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
         if not by_events:
             continue
         largest, broke = used.max(initial=1.0), damaged_at(points[state.point])
-        # The number of breaks is known here, their nodes at the next point: as many bonds are as loaded as the worst.
+        # This point has the number of breaks, the next point their nodes: so many bonds are loaded as the worst bond.
         worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[::-1][:broke]
         findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
         if after is not None and after.point == state.point + 1:

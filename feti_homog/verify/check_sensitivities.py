@@ -24,7 +24,7 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check values of all constants, and one derivative, in which all parameters change."""
+    """Check the values of all constants, and their derivatives along one change of all parameters."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):
@@ -175,8 +175,8 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)
     fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
-    # If radii grow, nodes around a fibre move with its circle, by amounts that fall to 0 halfway to the next fibre; the
-    # states keep u - E x.
+    # If radii grow, nodes around a fibre move with its circle, by amounts that fall to 0 halfway to the next fibre;
+    # u - E x at the nodes does not change.
     for c, R in zip(fibres.centre, fibres.radius, strict=True) if growth else ():
         gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
         half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R

@@ -18,8 +18,8 @@ LAW = "phases"
 # Names of criteria by a key that no other criterion has.
 CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
 MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")
-# Relative differences that count as rounding: of the value at the position of the largest value, from it; and of the
-# position from a quadrature point.
+# Relative differences that count as rounding: between the largest value and the value at the stated position; between
+# the position and a quadrature point.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9
 # Least scale of stresses in a phase, relative to L |E|: smaller stresses, as in a free body, are rounding.
 ROUNDED = 1e-4

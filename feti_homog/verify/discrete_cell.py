@@ -15,7 +15,7 @@ from feti_homog.verify.elements import Elements, add_at_nodes
 from feti_homog.verify.findings import ROUNDING
 from feti_homog.verify.reading import ResultFiles, State, Status, gradient
 
-# Share of the terms that is added to the scale of their sum; about 1e-15 of the terms is rounding.
+# Fraction of the terms to add to the scale of their sum; rounding is about 1e-15 of the terms.
 ROUNDED_TERMS = 1e-5
 
 
@@ -35,7 +35,7 @@ class Faces:
         row: (b,) interface node of a torn node, or -1.
         is_fibre: (b,) whether a torn node belongs to the inner body.
         copies: (b,) number of periodic images of a torn node in its subdomain.
-        distance, place: (k,) place of an interface node and the distance to it; -1 and inf without a place.
+        distance, place: (k,) place of an interface node, and distance from the node; -1 and inf without a place.
         pair: (places,) section of the two bodies, if exactly two bodies meet along one line; else -1.
     """
 
@@ -191,7 +191,7 @@ class DiscreteCell:
         return sums
 
     def loads(self, strain: Float, temperature: float) -> Float:
-        """Add the largest thermal strain of a phase to a strain (v,)."""
+        """Return a strain (v,) plus the largest thermal strain of any phase, as a scale."""
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float) -> Scales:

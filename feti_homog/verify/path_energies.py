@@ -6,13 +6,13 @@ E_s and stresses Sigma_f; its potential is
 
     P(E_s, Sigma_f) = min over E_f of W - Sigma_f.E_f = 1/2 (E_s.Sigma_s - Sigma_f.E_f),
 
-convex in E_s and concave in Sigma_f.  So a state ' under another load with the same bonds bounds P: for any t >= 0
+convex in E_s and concave in Sigma_f.  So a state under another load with the same bonds (') bounds P: for any t >= 0
 
     P >= t Sigma'_s.E_s - t^2 W'   if Sigma_f = t Sigma'_f,
     P <= t^2 W' - t E'_f.Sigma_f   if E_s = t E'_s.                                                         (P)
 
-Bonds break at constant load and lose P before - P after.  The files have one of these two states; (P) bounds the other
-potential by the next state with the same bonds.  Both bounds are equal where the loads are in proportion: on the first
+Bonds break at constant load; the loss is P before - P after.  The files have one of these two states; (P) bounds the
+other potential by the next state with the same bonds.  Both bounds are equal for proportional loads: on the first
 leg, in a cascade, and on a later leg along a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
 Between event points without breaks the response is linear, so that the work is (Sigma + Sigma').(E' - E) / 2.
 """
@@ -128,10 +128,10 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
-    """Check that an increment without breaks has the heat: tractions at its end times its slips.
+    """Check the heat of an increment without breaks: tractions at its end times the growth of slips.
 
-    The error is relative to the heat so far plus the tractions times the slips since the beginning, whose difference
-    is the heat.  The work is not evidence of heat: runs compute it as the sum of stored energy, loss and heat.
+    The error is relative to these tractions times the slips at both ends, plus the rounding of the energies.  The
+    work in the result is no evidence: runs compute it as the sum of stored energy, loss and heat.
     """
     files, at = cell.files, state.point
     points = files.document["path"]
@@ -149,7 +149,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Return bounds by (P) of a load's potential with the bonds of another state."""
+    """Return the bounds (P) of a load's potential, from another state with the same bonds."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)

@@ -29,7 +29,7 @@ GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROU
 
 @dataclass(frozen=True)
 class ResultKey:
-    """A key of a document, `path` being its place: `cell.width`, `path[].strain`, `timings.STAGE`."""
+    """A key of a document; `path` is its place, such as `cell.width`, `path[].strain`, `timings.STAGE`."""
 
     path: str
     type: str
@@ -69,7 +69,7 @@ def spatial_items() -> Iterator[Item]:
 
 
 def _keys(kind: type, above: str = "") -> Iterator[ResultKey]:
-    """Yield the keys of a record's document, with the records in it."""
+    """Yield the keys of a record and of the records that it contains."""
     hints = typing.get_type_hints(kind)
     for name, description in descriptions(kind).items():
         path, hint = f"{above}{name}", without_none(hints[name])
@@ -84,7 +84,7 @@ def _keys(kind: type, above: str = "") -> Iterator[ResultKey]:
 
 
 def _items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
-    """Yield the items of a group with its views."""
+    """Yield the items of a group, then its virtual datasets."""
     hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):
@@ -112,6 +112,6 @@ def _type_words(hint: Any, description: Description) -> str:
 
 
 def _record_of_tuple(hint: Any) -> type | None:
-    """Return the record's class of `tuple[Record, ...]`."""
+    """Return the class `Record` for `tuple[Record, ...]`, None for other hints."""
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     return item if dataclasses.is_dataclass(item) and isinstance(item, type) else None

@@ -23,7 +23,7 @@ def write(folder: Path) -> None:
 
 
 def command_line() -> str:
-    """Return all commands with their arguments, and the exit codes."""
+    """Return the page on all commands, their arguments and the exit codes."""
     parts = ["# Command line", _console(command_parser().format_help())]
     for name, parser in _commands():
         parts += [f"## feti-homog {name}", _console(parser.format_help())]
@@ -33,11 +33,11 @@ def command_line() -> str:
 
 
 def case_file() -> str:
-    """Return the keys of every table of a case file."""
+    """Return the page on the keys of every table of a case file."""
     parts = [
         "# Case file",
-        "A case file is TOML. `feti-homog keys` prints these tables after an index by need, `feti-homog keys WORD` "
-        "the keys and sections that contain a word.",
+        "A case file is TOML. `feti-homog keys` prints these tables, after an index that lists keys by need. "
+        "`feti-homog keys WORD` prints the keys and sections that contain a word.",
     ]
     for each in reference.tables():
         rows = [(code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]
@@ -47,10 +47,10 @@ def case_file() -> str:
 
 
 def petsc_options() -> str:
-    """Return the PETSc options that the solver takes."""
+    """Return the page on the PETSc options that the solver takes."""
     words = (
-        "Options of the solver, on the command line, or without the dash in the section `[petsc]` of a case file; "
-        "the command line has precedence. `feti-homog options` prints them."
+        "Options of the solver. Give them on the command line, or, without the dash, in the section `[petsc]` of a "
+        "case file; the command line has precedence. `feti-homog options` prints this table."
     )
     rows = [(code(f"-{o.name}"), _choices(o.value), _choices(o.default), o.help) for o in OPTIONS]
     return page("# PETSc options", words, table(["option", "takes", "default", "meaning"], rows))

@@ -14,13 +14,14 @@ Any consistent units: stresses have the unit of the moduli in the case file, len
 Orders and signs: [README](../README.md#units-order-and-signs). Words in capitals stand for names that vary."""
 
 JSON = """\
-All numbers are finite. `KEY[]` is a list, whose entries have the keys that follow. Keys without a value are absent."""
+All numbers are finite. `KEY[]` is a list, whose entries have the keys listed after the dot, as in `path[].strain`.
+Keys without a value are absent."""
 
 HDF5 = """\
 n nodes, m elements, k interface nodes, f fibres; nodes are torn: each subdomain has its own nodes. K is the number of
 a state, from 0. The states of a stiffness are the unit strains, the states of a path are the points whose numbers
-`states` in result.json lists. Every dataset has the attributes `meaning` and `unit`; the unit is the label in the case,
-if any, and 1 for pure numbers.
+`states` in result.json lists. Every dataset has the attributes `meaning` and `unit`: the label that the case gives to
+the unit, if any, and 1 for pure numbers.
 
 In ParaView `result.xdmf` opens the cell and `interface.xdmf` the interface, with the `displacement` of the fibre's
 face. The filter Python Annotation, applied to the field data, shows a state's label by
@@ -33,16 +34,16 @@ strains, von Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf
 `mean_strain` and `mean_stress` are field data. In Python `feti_homog.read_state(DIR, K)` returns fields as arrays."""
 
 CASES_CSV = """\
-The table of a sweep has a row for each case; `collect` writes the results. i and j stand for 1, 2 or 3, in stiffnesses
-of generalized plane strain for 1 to 6."""
+The table of a sweep has a row for each case; `collect` writes the results. i and j stand for 1, 2 or 3; in stiffnesses
+of generalized plane strain, for 1 to 6."""
 
 STATISTICS_CSV = """\
-A row for each point of a sweep and each output has the statistics of the finished realisations. Times, memory, checks
-and outputs that are zero in all cases have no row."""
+Each row has the statistics of one output at one point of the sweep, over the finished realisations. Times, memory,
+checks and outputs that are zero in all cases have no row."""
 
 SPATIAL = """\
-In generalized plane strain, result.h5 has all entries above; this table lists changed and new entries. Fields do not
-vary along x3, except for the displacement E33 x3."""
+In generalized plane strain, result.h5 has all entries above; this table lists the entries that change or are new.
+Fields do not vary along x3, except for the displacement E33 x3."""
 
 
 def results() -> str:

@@ -38,7 +38,7 @@ TABLES: dict[str, tuple[Content, str]] = {
     "a large radius": (HEAD + "0.5,0.5,0.6\n", "expected"),
     "an open quotation": (HEAD + '"0.5,0.5,0.1\n', "a quotation mark is not closed"),
     "formulas": (HEAD + "=cmd|'/c calc',0.5,0.1\n", "x = "),
-    "columns of the same name": ("x,y,radius,x\n0.5,0.5,0.1,0.5\n", "there are two of it"),
+    "columns of the same name": ("x,y,radius,x\n0.5,0.5,0.1,0.5\n", "the name is there twice"),
     "many faults": (HEAD + "a,b,-1\n" * 10_000, "29980 more faults"),
     "1e6 rows": (HEAD + "a,b,-1\n" * 1_000_000, "1000001 lines; expected at most 200000"),
     "1e5 rows outside": (HEAD + "0,0,0.1\n" + "2,0,0.1\n" * 100_000, "and 99980 more faults"),

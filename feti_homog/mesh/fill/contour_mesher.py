@@ -1,6 +1,6 @@
 """The coarse mesh of a label image within smooth outlines: contours by marching squares, filled by gmsh.
 
-The sides of the cell lie on lines of pixel centres, between which contours begin and end, so that sides match.
+The cell sides run through pixel centres. Contours cross opposite sides at the same positions, so that sides match.
 """
 
 from dataclasses import replace
@@ -27,7 +27,7 @@ from feti_homog.typing import Bool, Float, Int32
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
     """Mesh the regions of an image with phases (rows, columns) within smooth outlines.
 
-    A Gaussian filter, one pixel wide, removes the steps from an indicator; splines follow its contour of equal area.
+    A Gaussian filter, one pixel wide, smooths an indicator; splines follow the contour that preserves the area.
 
     Raises:
         CaseError: scikit-image is not installed.
@@ -36,7 +36,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     try:
         from skimage import measure
     except ImportError:
-        raise CaseError('[cell] smooth = true: needs scikit-image, as by pip install "feti_homog[images]"') from None
+        raise CaseError('[cell] smooth = true: needs scikit-image: pip install "feti_homog[images]"') from None
     mask = _every_other(phase, phases)
     indicator = gaussian_filter(mask.astype(float), 1.0, mode="wrap")
     level = float(np.quantile(indicator, 1.0 - mask.mean(), method="midpoint"))
@@ -79,7 +79,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Mark the phases (rows, columns) that an odd number of outlines parts from the matrix.  Raises MeshError."""
+    """Mark the pixels (rows, columns) that an odd number of outlines separates from the matrix.  Raises MeshError."""
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
     a, b = a[a != b], b[a != b]
@@ -87,14 +87,15 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
     is_odd = dijkstra(touching, directed=False, indices=0, unweighted=True) % 2 == 1
     for k in np.flatnonzero(is_odd[a] == is_odd[b])[:1]:
         names = f"{phases[a[k]]} and {phases[b[k]]} touch beside a third phase"
-        raise MeshError(f"[cell] smooth = true: {names}; expected two phases at an outline, as of fibres in coatings")
+        raise MeshError(f"[cell] smooth = true: {names}; expected only two phases along each outline")
     return np.asarray(is_odd[phase])
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
-    """Return the size field: small curves have MIN_EDGES_AROUND edges, or half as many if a side cuts them.
+    """Return the field of edge sizes for `curves`, points (k, 2) in pixels.
 
-    In narrow passages, between points with opposite gradients, edges are shorter.
+    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, half as many. In narrow passages,
+    between points with opposite gradients, edges are shorter.
     """
     unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
     points = np.concatenate([np.zeros((1, 2)), *curves])
@@ -113,9 +114,9 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 
 
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
-    """Give each surface the phase that prevails among its elements, and empty voids.
+    """Assign the prevailing phase of its elements to each surface, and remove the elements of voids.
 
-    Edges that turn by more than 87 degrees, with a rise of 0.2 lengths, become straight.
+    Edges with a rise of more than 0.2 lengths, which turn by more than 87 degrees, become straight.
     """
     ((tags, nodes, entity),) = (rows for kind, rows in content.elements.items() if kind.startswith("Triangle"))
     order, points = np.argsort(content.tags), content.points.copy()

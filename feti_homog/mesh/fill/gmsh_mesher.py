@@ -28,16 +28,16 @@ def begin(
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh of a generated cell.
 
-    A lattice, random cell or table with round or elliptic fibres gets bare lines, a table with polygons a mesh.
+    Round and elliptic fibres give an `UnmeshedCell`, whose lines lack nodes; a table with polygons gives the mesh.
 
     The element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before
     the final scaling, so that cells of one shape have the same mesh at all sizes.
 
     Args:
         listed: the arrangement of a table; None for other cells, which may be large.
-        marks: directions of debond tips, where the mesh gets nodes. A mark moves to another mark, or to a crossing of
-            the circle with the cell boundary, within MERGED.
-        policy: the choice of tiles.
+        marks: directions of debond tips, where the mesh gets nodes. A mark within MERGED of another mark, or of a
+            crossing of the circle with the cell boundary, moves there.
+        policy: rules for the division into tiles.
 
     Raises:
         MeshError: the fibres cannot be arranged, or the mesh would have too many elements.

@@ -23,15 +23,15 @@ from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.microstructure.shapes import convex_sums
 from feti_homog.typing import Float
 
-# Largest distance of a curve on a side from the side / cell size; largest core / frame of a polygon that is a circle.
+# Distance / cell size up to which a curve lies on a side; core / semi-axis up to which a shape is an ellipse.
 SAME_PLACE = 1e-6
-# Limits for the grid cells of the sizes along a side.
+# Fewest and most grid cells along a side, for the grid of sizes that gmsh reads.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-# Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.
+# Edge length on a coating / thickness; cosine between the normals of outline and side, above which both face.
 COATING_EDGE, FACING = 2.0, 0.9
 # Number of sources that contribute to the size at a position.
 NEAREST = 12
-# Smallest size / size of the cell.
+# Smallest edge size / size of the cell.
 LEAST = 1e-5
 
 
@@ -56,7 +56,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
-    """Fill the surfaces of a cell with periodic second-order triangles of the sizes in a field."""
+    """Fill the surfaces of a cell with periodic second-order triangles, with edge sizes from `field`."""
     # Curves on the right and upper sides copy the nodes of the left and lower sides.
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -89,7 +89,7 @@ def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces in the cell to a group for each phase; return the precedence of each surface."""
+    """Add the surfaces in the cell, in one group for each phase; return precedences by surface tag."""
     occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
     assert isinstance(curves, convex_sums.ConvexSums)
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))

@@ -1,4 +1,4 @@
-"""The cell lines, with sizes and nodes: sides, fibre arcs, and bridges between fibres.
+"""The lines of a cell, with edge sizes and nodes: cell sides, fibre arcs, and bridges between fibres.
 
 Imports `case`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """

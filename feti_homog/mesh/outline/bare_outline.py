@@ -1,4 +1,4 @@
-"""The cell lines with discs and ellipses, cut at crossings, before all ranks place nodes on the lines."""
+"""The lines of a cell with discs or ellipses, cut at crossings; all ranks then place nodes on the lines."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class BareOutline:
 
     Attributes:
         size: (2,) width and height of the cell.
-        curves, disc, around: k outlines, (k,) and (k,), as in `outline.images`.
+        curves, disc, around: k outlines, their fibres (k,) and surrounding outlines (k,), from `outline.images`.
         vertices: (v, 2) line ends.
         circle: (a,) curve of each arc.
         lines: arcs and bridges.
@@ -60,7 +60,7 @@ class BareOutline:
         angles = outline.vertex_angles(curves, name, crossing, marks)
         border = np.unique(border, axis=0)
         (circle, *_), ends, away = _arcs(curves, border, angles, size)
-        # Except marks, vertices on inner coating curves face vertices on the outer curve, at the same distances.
+        # Without marks, the vertices on the inner curve of a coating repeat the distances of the outer vertices.
         sparse = (around != MATRIX) & ~np.isin(name, list(marks))
         outer = np.concatenate([border, ends[away & ~sparse[circle]]])
         # Bridge ends have enough room, and need no finer edges.
@@ -90,7 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, and place equal nodes on opposite sides.
+        """Make the outline from nodes on arcs and bridges, with matching nodes on opposite sides.
 
         Raises:
             MeshError: the sides would have more nodes than the sampling allows.

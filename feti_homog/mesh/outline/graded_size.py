@@ -163,8 +163,8 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """Return the edge size on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
-    of the cell, with h_k proportional to the passage width, and the mandatory `vertices` (v, 2), with the distance to
-    the next vertex.
+    of the cell, with h_k proportional to the passage width. The mandatory `vertices` (v, 2) are sources, too, where h_k
+    is the distance to the next vertex.
 
     The size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one
     of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
@@ -201,7 +201,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     sources += [(corners, np.tile(to_corner[close], 2), np.full(len(corners), MAX_GROWTH)), at_vertices(vertices, size)]
     if not sizes.are_graded(arrangement):
         return SizeField(sources, size, largest)
-    # Points at distances h_i on the outer circles, for searches of the nearest disc.
+    # Points on the outer circles, h_i apart, to find the nearest disc.
     lengths = sizes.on_circles(arrangement)
     counts = np.ceil(2 * np.pi * outer[:, 2] / lengths).astype(int)
     disc = np.repeat(np.arange(len(counts)), counts)
@@ -211,7 +211,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 
 class FromLines:
-    """The minimum of h_i + g d and h_t + g max(0, d - h_t), see `size_field`.
+    """The size that grows from lines and tips: min(h_i + g d, h_t + g max(0, d - h_t)), see `size_field`.
 
     Attributes:
         least: lower bound of the sizes.

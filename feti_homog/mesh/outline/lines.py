@@ -56,7 +56,7 @@ class Curves:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
-        """Concatenate the points (n, 2) and the curves of all parts, which number points from 0."""
+        """Concatenate the points (n, 2) and the curves of all parts, each of which numbers its points from 0."""
         begin = np.cumsum([0, *(len(points) for points, _ in parts)])
         counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
         curves = cls(
@@ -199,8 +199,8 @@ def _refuse_many(edges: float, limit: int) -> None:
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
     """Place nodes on lines at equal steps of the integral of ds / h, with the edge size h.
 
-    A line has at least `least_edges` edges, () or (c,). Samples of h are at `least_samples` equidistant positions on
-    each line and, for graded sizes, at SAMPLES_OF_AN_EDGE positions or more on each edge.
+    `least_edges`, () or (c,), is the least number of edges of a line. A line has at least `least_samples` equidistant
+    samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
 
     Raises:
         MeshError: the lines would have more than `limit` nodes.

@@ -1,4 +1,4 @@
-"""The cell lines with nodes, and the steps before: images, vertices, arcs and pieces of sides."""
+"""The cell lines with nodes, and the preceding steps: images, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Outline:
         curves: curves through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
         disc: (k,) disc or ellipse of each image.
-        around: (k,) circle around each circle; MATRIX in the matrix.
+        around: (k,) the circle that surrounds each circle; MATRIX for a circle in the matrix.
     """
 
     points: Float
@@ -110,7 +110,7 @@ def curve_at(curves: Conics, points: Float) -> Int:
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
-    """Find the curve (c,) of each point on a curve; also return the points (c, 2)."""
+    """Find the points that lie on curves; return the curves (c,) and the points (c, 2)."""
     close = cKDTree(points).query_ball_point(curves.centres, curves.longest * (1 + SAME_PLACE))
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]

@@ -33,8 +33,8 @@ BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 def load(path: Path) -> RawMesh:
     """Read triangles, quadrilaterals and lines from an input file with one part.
 
-    The set that a *SOLID SECTION names, else the *ELSET, else the ELSET on *ELEMENT is the phase of a triangle, or the
-    curve of a line; names are in lower case unless quoted. Elements have first or second order.
+    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names, else the *ELSET, else the
+    ELSET of *ELEMENT; names become lower case unless quoted. Elements have first or second order.
 
     Raises:
         OSError: the file cannot be read.

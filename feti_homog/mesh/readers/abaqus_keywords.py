@@ -26,7 +26,7 @@ GENERATORS = (
 REFUSED = dict.fromkeys(GENERATORS, "it makes or moves nodes or elements, and is not read: write them out")
 REFUSED["INCLUDE"] = "other files are not read: expected all in one file"
 WHOLE = {name.replace(" ", ""): name for name in (*READ, *REFUSED)}
-# Beginnings of keywords without nodes and elements, without blanks.
+# Beginnings, without blanks, of keywords that make no nodes or elements.
 BEGINNINGS = """
 ACOUSTIC ADAPTIVE ADJUST AMPLITUDE ANISOTROPIC ANNEAL AQUA BASELINE BASEMOTION BEAM BIAXIAL BOND BOUNDARY BRITTLE
 BUCKL BULKVISCOSITY CADDEDMASS CAP CASTIRON CAVITY CECHARGE CECURRENT CENTROID CFILM CFLOW CFLUX CHANGEFRICTION CLAY
@@ -59,7 +59,7 @@ class KeywordBlock:
     Attributes:
         number: number of the keyword line, from 1.
         word: the keyword as in the file.
-        keyword: the keyword in full; empty for keywords without nodes and elements.
+        keyword: the keyword in full; empty for keywords that make no nodes or elements.
         parameters: parameter values by parameter names in upper case.
         rows: the words of each data line.
     """
@@ -130,7 +130,7 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
 
 
 def resolved(word: str) -> str:
-    """Complete an abbreviated keyword; empty for keywords without nodes and elements.
+    """Complete an abbreviated keyword; return "" for keywords that make no nodes or elements.
 
     Blanks and capitals do not matter. An abbreviation is valid if it is the beginning of only one keyword.
 

@@ -1,4 +1,4 @@
-"""Check the meshes of users: a function lists the faults of one kind, and names the first nodes or elements."""
+"""Check the meshes of users: each function lists the faults of one kind, with the first nodes or elements."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -27,7 +27,7 @@ ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """List one fault that names the first few items; no fault without items."""
+    """Return one fault that names the first few items; [] without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 

@@ -30,7 +30,7 @@ NUMBER = re.compile("number [0-9]+")
 """Names of groups that have only a number in the file."""
 HOLE = "expected no elements in a void, which is a hole in the mesh (with voids = true in [cell])"
 Selectors = Mapping[str, tuple[str | int, ...]]
-# Sine of the angle at a hull node up to which the angle is zero but for rounding.
+# Sine of the turn at a hull node, up to which the node lies on a straight side.
 STRAIGHT = 1e-5
 # Slope up to which sides count as upright; fraction of the hull that a cell with voids fills at least.
 UPRIGHT, FILLED = 1e-2, 0.4
@@ -45,8 +45,8 @@ def read(
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
-    The file, of a suffix in LOADERS, has triangles with three or six nodes, in either sense, in physical surfaces
-    "matrix", "fibre", "glass", ... The triangles fill a rectangle, except voids if the cell `has_voids`, and opposite
+    The file, of a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
+    "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`, and opposite
     sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are debonded
     from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses (`with_ellipses`);
     other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and numbers in the file
@@ -70,7 +70,7 @@ def read(
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
-    """Check a raw mesh and convert it; faults begin with `path`. Raises as `read`."""
+    """Check a raw mesh and convert it; faults begin with `path`. Raises MeshError, as `read` does."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All triangles become counter-clockwise; middle nodes belong to edges of either direction.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
@@ -112,7 +112,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     _refuse(path, mesh_checks.cannot_debond(raw, torus))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     mesh = with_circles(mesh, middles)
-    # Fibre numbers are those without bent edges: round fibres first.
+    # Number the fibres before edges bend, so that round fibres come first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
     return replace(with_bent_edges(with_ellipses(mesh, middles), middles), precedence=numbers)
 

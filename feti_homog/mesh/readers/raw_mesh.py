@@ -12,7 +12,7 @@ from feti_homog.typing import Float, Int, Int32
 
 # The physical curve of edges that are debonded from the start.
 DEBONDED = "debonded"
-# Ratio of the smaller triangles of both diagonals, from which the ratio prevails over alternating diagonals.
+# Ratio of the smaller triangles of both diagonals above which the better diagonal replaces the alternating diagonal.
 MUCH_LARGER = 2.0
 
 
@@ -130,7 +130,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Assemble one or more blocks, with all corner nodes in use, into one mesh.
+    """Assemble one or more blocks of elements into one mesh of all corner nodes in use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
@@ -178,8 +178,8 @@ def in_triangles(corners: Int, points: Float) -> Int:
     """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
     Diagonals join nodes at an even number of sides from the first node of connected quadrilaterals, so that diagonals
-    alternate in a grid: parallel diagonals couple stretch and shear.  The cut depends on positions, not on numbers.  If
-    this diagonal makes a much smaller triangle than the other diagonal, or does not exist, the better diagonal counts.
+    alternate in a grid: parallel diagonals couple stretch and shear.  The cut depends on positions, not on numbers.
+    Where no such diagonal exists, or it cuts off a much smaller triangle than the other, the better diagonal is used.
     """
     x, y = points[corners].T[:2]  # (4, m)
 

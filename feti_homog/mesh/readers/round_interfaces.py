@@ -76,8 +76,8 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
-    of the ellipse parameter, or have a rise of more than MOST_BENT edge lengths. Middle nodes cut edges in two. Other
-    interfaces do not change. Edges flip in triangles with two edges on one ellipse.
+    of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
+    interfaces do not change. In triangles with two edges on one ellipse, an edge flips.
     """
     torus, nodes = Torus.of(mesh), len(mesh.points)
     pairs = torus.low_copies(torus.is_outline)
@@ -101,8 +101,8 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
-    Edges on circles and ellipses do not change, and neither do straight edges, with the middle node within STRAIGHT
-    lengths of the chord. Edges flip in triangles with two edges on one curve, which has no corner between the edges.
+    Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
+    chord. A triangle with two edges on one curve flips an edge: the curve has no corner between them.
     """
     torus, nodes = Torus.of(mesh), len(mesh.points)
     pairs = torus.low_copies(torus.is_outline)

@@ -78,8 +78,8 @@ def mesh_of(grid: Grid) -> RawMesh:
     """Convert a grid into triangles and lines.
 
     The cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.  Without `phase`, the first of NUMBERS in
-    the grid, or else the only cell data of whole numbers, group the triangles.  The optional cell data `debonded` are 1
-    on lines that are debonded from the start.  All other lines form one curve for each number or, with `phase`, a
+    the grid, or else the only cell data of whole numbers, groups the triangles.  The optional cell data `debonded` are
+    1 on lines that are debonded from the start.  All other lines form one curve for each number or, with `phase`, a
     single curve `line`.
 
     Raises:
@@ -144,7 +144,7 @@ def _other_cells(types: Int, counts: Int, first: int) -> list[str]:
 
 
 class NotANumber(ValueError):
-    """The error for a word at `place` in a text that should be a number."""
+    """The error for a word, at `place` in a text, that is not a number."""
 
     def __init__(self, text: bytes, kind: str) -> None:
         wrong = WRONG_WORD[kind].search(text)

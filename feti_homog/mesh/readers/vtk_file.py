@@ -34,7 +34,7 @@ TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
 WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
 # Cell sections of Medit: VTK cell type, number of nodes.
 CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
-# Values for an entry of each section, for cells the nodes and a reference; vectors have the space dimension.
+# Number of values in an entry of each section: of cells, the nodes and a reference; of vectors, the dimension.
 ENTRIES = {
     **dict.fromkeys(("CORNERS", "RIDGES", "REQUIREDVERTICES", "REQUIREDEDGES", "REQUIREDTRIANGLES"), 1),
     **dict.fromkeys(("NORMALATVERTICES", "TANGENTATVERTICES", "VERTEXONGEOMETRICVERTEX", "EDGEONGEOMETRICEDGE"), 2),
@@ -168,7 +168,7 @@ class Scanner:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Read the words of the next line, without blank lines and METADATA blocks; empty at the end."""
+        """Read the words of the next line, past blank lines and METADATA blocks; empty at the end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)

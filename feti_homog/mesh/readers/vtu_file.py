@@ -30,7 +30,7 @@ SEGMENT = re.compile(rb"[^=]+={0,2}")
 
 
 def load(path: Path) -> RawMesh:
-    """Read triangles and lines, with numbers from 0 through all pieces of a file.
+    """Read triangles and lines, numbered from 0 through all pieces of a file.
 
     Raises:
         OSError: the file cannot be read.
@@ -116,7 +116,7 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Read the numeric arrays (k,) or (k, width) of a section by name."""
+        """Read the numeric arrays of a section: name -> (k,) or (k, width)."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))

@@ -11,7 +11,7 @@ import numpy as np
 from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, on_circle, widest
 from feti_homog.typing import Bool, Float, Int
 
-# Relative difference of the squares of semi-axes of a circle.
+# Relative difference of the squared semi-axes, up to which an ellipse is a circle.
 SAME_AXES = 1e-12
 # The least ratio of shorter to longer semi-axis; thinner tips would need too small elements.
 THINNEST = 0.05
@@ -264,4 +264,4 @@ class Discs(ConvexCurves):
 
 
 Conics = Discs | Ellipses
-"""Outlines whose meshes have nodes at debonded arc tips."""
+"""Outlines whose meshes may have nodes at the tips of debonded arcs."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Directions at the start of the search for the widest gap, then refinements and directions of a refinement.
+# Search for the widest gap: number of first directions, of refinements, and of directions in a refinement.
 DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
 
 # Numbers (N,) of the rows of a table by column; an empty cell has NaN or the default of the column.

@@ -11,10 +11,10 @@ from feti_homog.typing import Bool, Float
 
 Shape = EllipticRows | PolygonalRows
 SHAPES: tuple[Shape, ...] = (EllipticRows(), PolygonalRows())
-"""All shapes but discs, the shape of all other rows.
+"""All shapes except discs; rows of no other shape are discs.
 
-Each has a plural `name`, the `columns` that no other shape needs, `sizes`, the columns of the largest lengths, in place
-of "radius" unless they include it, and `has_tips`, whether its mesh may have nodes at debonded arc tips.
+A shape has a plural `name`; the `columns` that no other shape needs; `sizes`, the columns of its largest lengths, which
+replace "radius" unless they include it; and `has_tips`, whether a mesh may have nodes at the tips of debonded arcs.
 """
 BOTH_SIZES = "has a radius and semi-axes; give one"
 

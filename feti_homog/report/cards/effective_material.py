@@ -21,7 +21,7 @@ FIBRE_FIRST = (2, 0, 1)
 PAIRS: list[tuple[int, ...]] = [(int(name[1]) - 1, int(name[2]) - 1) for name in voigt.SPATIAL_STRESSES]
 """The pairs of axes of Voigt's order [11, 22, 33, 23, 13, 12]."""
 ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
-"""Where in the order of the cell the components of a card stand: C_card = C_cell[ORDER][:, ORDER]."""
+"""The indices of a card's components in the order of the cell: C_card = C_cell[ORDER][:, ORDER]."""
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
@@ -33,8 +33,8 @@ AXES = (
 CONDUCTOR_AXES = "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. q = -k grad T."
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
-"""Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
-is far above what irregular meshes make of symmetric cells (1e-6), and below what is known of constants (1e-2)."""
+"""Couplings up to this fraction of sqrt(C_ii C_jj), and shears up to this fraction of the largest expansion, are left
+out: far above the noise of irregular meshes in symmetric cells (1e-6), below the accuracy of constants (1e-2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class EffectiveMaterial:
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
-        errors: known mesh errors, by the names in `constants` and of expansions.
+        errors: estimated mesh errors, by name of constant or expansion.
     """
 
     name: str
@@ -106,7 +106,7 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         sizes.append(float(np.abs(expansion[3:]).max() / max(np.abs(expansion).max(), TINY)))
         text += f" and shears of up to {sizes[1]:.2g} of the largest expansion"
     if max(sizes) > NEGLIGIBLE:
-        symmetry = f"Not orthotropic in these axes, for there are {text}; {NEGLIGIBLE} would be left out."
+        symmetry = f"Not orthotropic in these axes: there are {text}; up to {NEGLIGIBLE} would be left out."
     else:
         symmetry = f"Orthotropic; {text} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
@@ -226,7 +226,7 @@ def identifier(name: str) -> str:
 
 
 def conductor_card(document: Document, form: str, symmetry: str) -> str:
-    """Return the card for a conductivity, as computed or the nearest one that is "transversely isotropic".
+    """Return the card of a conductivity as computed, or of the nearest "transversely isotropic" conductivity.
 
     Couplings up to `NEGLIGIBLE` sqrt(k_ii k_jj) are left out.
 

@@ -27,14 +27,14 @@ from feti_homog.report.cards import effective_material
 from feti_homog.results import output_folder, result_json
 from feti_homog.typing import Document
 
-FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
+FIELD, FIELDS = 20, 8  # in Abaqus: characters of a number, numbers in a line
 TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
 ABAQUS_ORDER = [voigt.SPATIAL_STRESSES.index(name) for name in ("S11", "S22", "S33", "S12", "S13", "S23")]
-"""Where in [11, 22, 33, 23, 13, 12] the components of Abaqus' order stand."""
+"""The indices in [11, 22, 33, 23, 13, 12] of the components in Abaqus' order."""
 ABAQUS_ENTRIES = tuple((ABAQUS_ORDER[row], ABAQUS_ORDER[column]) for column in range(6) for row in range(column + 1))
 """Rows and columns of D1111, D1122, D2222, D1133, ..., D2323: the upper triangle by columns."""
 ANSYS_ORDER = [voigt.SPATIAL_STRESSES.index(name) for name in ("S11", "S22", "S33", "S12", "S23", "S13")]
-"""Where in [11, 22, 33, 23, 13, 12] the components of ANSYS' order [x, y, z, xy, yz, xz] stand."""
+"""The indices in [11, 22, 33, 23, 13, 12] of the components in ANSYS' order [x, y, z, xy, yz, xz]."""
 ANSYS_ENTRIES = tuple((ANSYS_ORDER[row], ANSYS_ORDER[column]) for column in range(6) for row in range(column, 6))
 """Rows and columns of D11, D21, ..., D61, D22, ..., D66."""
 ANSYS_LABELS = {

@@ -29,7 +29,7 @@ TURN = 0.618  # golden section: as a fraction of the colour circle, it never rep
 LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
-CUT = "#B00000"  # of bodies
+CUT = "#B00000"  # colour of cuts within bodies
 FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours do not tell values
 
 
@@ -48,7 +48,7 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     longest = max(attributes["width"], attributes["height"])
     inches = float((picture.get_size_inches() - drawn_cell.MARGINS).min()) / longest
     write_fibre_numbers(axes, cell, inches, factors if varies else None)
-    text = "\nbelow the numbers: strength / that of [interface]" if varies else ""
+    text = "\nbelow the numbers: strength / strength in [interface]" if varies else ""
     axes.set_title(_title(attributes, f"bodies: {drawn.body.max() + 1}") + text)
     present = np.unique(drawn.phase)
     # Legends leave out labels that begin with "_".
@@ -68,7 +68,7 @@ def _cyclic_colours(count: int) -> Array:
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
-    A subdomain across several materials counts once a body.  More than `IN_LEGEND` colours are pale, with numbers.
+    A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)

@@ -78,7 +78,7 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
         for name in ("body", "subdomain", "rank", "phase")
         if f"mesh/{name}" in file
     }
-    labels.setdefault("rank", np.zeros_like(labels["body"]))  # of files that do not have it yet
+    labels.setdefault("rank", np.zeros_like(labels["body"]))  # older files have no ranks
     points = _picked(file["mesh/points"], nodes, block)
     return DrawnMesh(block, group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
 
@@ -145,7 +145,7 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
     shear = 0.5 * loads["gamma12"]
-    x = drawn.points - drawn.points.min(axis=0)  # as far from the origin as may be, a factor would move the picture
+    x = drawn.points - drawn.points.min(axis=0)  # else a factor would move the picture of a cell far from the origin
     fluctuation = displacement - x @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
     areas = _determinant(_sides(drawn.points, drawn))
     return np.asarray(displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas))

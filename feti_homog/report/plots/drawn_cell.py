@@ -36,7 +36,7 @@ STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN:
 STATE_COLOURS = {BONDED: "black", CLOSED: "#E69F00", OPEN: "#0072B2"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
 SIDE, MARGINS = 4.8, np.array([1.9, 1.4])  # inches: longer side of a cell in a picture, room for text and a bar
-# An edge has the state of that end which comes later in this order.
+# An edge has the state of the end whose state comes later in this order.
 ORDER = np.array(list(STATE_NAMES))
 
 

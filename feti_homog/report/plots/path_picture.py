@@ -111,7 +111,7 @@ def _stress_curves(
 
 
 def _line_style(values: Array, drawn: list[Array]) -> str:
-    """Return dashes if a curve (n,) mostly covers a `drawn` curve, else a solid line; add it to `drawn`."""
+    """Return dashes if a curve (n,) mostly covers a `drawn` curve, else a solid line; append it to `drawn`."""
     tolerance = 0.01 * max(np.abs([values, *drawn]).max(), 1e-300)
     covers = any(np.mean(np.abs(values - other) <= tolerance) > 0.5 for other in drawn)
     drawn.append(values)

@@ -39,12 +39,12 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
-    VON_MISES: ("stress_33", None),  # and the others
+    VON_MISES: ("stress_33", None),  # and the tables of all other components
 }
 OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
-# Of curves: the colours of Okabe and Ito, which the colour-blind tell apart.
+# Colours of curves, by Okabe and Ito: colour-blind readers can tell them apart.
 INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-# Colours of macroscopic stresses: one a component in all pictures.
+# Colours of macroscopic stresses: a component has the same colour in all pictures.
 STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
 ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # of the stiffness
 MESH = "0.4"  # colour of element sides

@@ -27,12 +27,12 @@ THERMAL = {
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
 MESH_ERROR = "Mesh error,"
 PAIRS = 2  # constants per line of text
-# Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
+# Constants whose sensitivities are shown, in the plane (False) and in space (True); result.json has all.
 SHOWN = {
     False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33"),
     True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
 }
-MOST = 9  # of other constants
+MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
@@ -77,9 +77,9 @@ def _errors(document: Document) -> Document:
 
 
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return a table of constants and mesh errors, `abreast` per line; ratios in pairs have six decimals.
+    """Return a table of constants and mesh errors, `abreast` per line.
 
-    Errors have two digits, and constants as many decimals as their errors.
+    Errors have two digits, and constants as many decimals as their errors; ratios without an error have six decimals.
     """
     rows = []
     for name, value in values.items():
@@ -133,7 +133,7 @@ def moduli(document: Document) -> Table:
 def bounds(document: Document) -> Table:
     """Return a table of computed constants between their bounds; values outside are marked."""
     if not document.get("bounds"):
-        return Table("Bounds: none of cells with voids", [], [])
+        return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
     for i, name in enumerate(STIFF):
         lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]

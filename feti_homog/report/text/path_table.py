@@ -17,7 +17,7 @@ ROWS = 15  # of the table
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
 
-    Columns: strains that waypoints drive, stresses that they name or that act, temperature, other strains.
+    Columns: leading and prescribed strains, named and acting stresses, temperature, strains of prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
@@ -86,7 +86,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
             name = stresses_of_path[k] + stress_label(document)
             lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {strains[k]} = {strain:.6g} (point {number})")
     if path_curves.scales_with_toughness(document):
-        lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
+        lines.append("Scaling: strains and stresses of the path grow with the root of the toughness")
     return lines
 
 

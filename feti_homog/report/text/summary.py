@@ -31,7 +31,7 @@ class ReportedAnalysis:
         title: the name in words.
         is_curve: whether the states are points of a curve, shown side by side.
         is_followed: whether first and last states matter most.
-        picture: picture name of a state; "" stands for the name of the unit load.
+        picture: name of the picture of a state; "": the picture has the name of the unit load.
     """
 
     name: str

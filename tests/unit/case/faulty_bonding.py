@@ -149,7 +149,7 @@ FAULTY_COHESIVE_LAWS: dict[str, str] = {
         "[interface] normal_stiffness = 1e+99": "expected at most 5e+11; the damage of stiffer springs has no digits",
         "[interface] teeth = 0": "expected an integer at least 1 and at most 10000",
         '[interface] growth = "released"':
-            'belongs to law = "energy", not "bilinear"; use no growth: a law that softens takes the energy of its',
+            'belongs to law = "energy", not "bilinear"; use no growth: a law that softens dissipates the energy of',
     }),
     '[interface] axial_friction = "prevented": unknown key; leave it out: debonded faces slip freely along ':
         of_type("path", PATH, "[interface]", "friction = 0.3", 'axial_friction = "prevented"'),
@@ -170,6 +170,6 @@ FAULTY_COHESIVE_LAWS: dict[str, str] = {
         of_type("path", PATH, "[interface]", *BRANCH, "openings = [0.1, 0.1]", "tractions = [1, 0]"),
     "[interface] openings, tractions: 2 and 3 numbers; expected as many of both":
         of_type("path", PATH, "[interface]", *BRANCH, "openings = [0.1, 0.2]", "tractions = [1, 0.5, 0]"),
-    "[interface] normal_stiffness = 11: expected 1, that of openings and tractions, or none":
+    "[interface] normal_stiffness = 11: expected 1, as from openings and tractions, or no value":
         of_type("path", PATH, "[interface]", *BRANCH, "normal_stiffness = 11\nopenings = [1, 2]\ntractions = [1, 0]"),
 }  # fmt: skip

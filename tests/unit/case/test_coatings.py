@@ -33,7 +33,7 @@ def listed(*coatings: float | None, **cell: object) -> dict:
     (SQUARE | {"fibre_fraction": 0.65}, ("coating",),
      '[cell] fibre_fraction = 0.65: expected less than 0.6491 for geometry = "square": there the coatings touch'),
     (listed(0.1, 0.0), (), "[material.coating]: missing section; [cell] has coatings"),
-    (listed(0.1, None, coating=0.2), ("coating",), "[cell] coating = 0.2: fibre_list has a column of it; give one"),
+    (listed(0.1, None, coating=0.2), ("coating",), "[cell] coating = 0.2: fibre_list has a column coating; give one"),
 ])  # fmt: skip
 def test_faults_of_coatings(cell, phases, fault):
     with pytest.raises(CaseError) as caught:

@@ -97,7 +97,7 @@ FAULTS = {
     "lattice": ({"geometry": "square", "mix": MIX}, "carbon = 0.25}: belongs to geometry = "),
     "no fraction": ({"fibres": 9, "mix": {"glass": 0.3, "carbon": 0.0}}, "carbon = 0.0}: expected a table by phase"),
     "nothing": ({"fibres": 9, "mix": {}}, "[cell] mix = {}: expected a table by phase"),
-    "of matrix": ({"fibres": 9, "mix": {"glass": 0.3, "matrix": 0.2}}, "by phase, other than matrix, coating and void"),
+    "of matrix": ({"fibres": 9, "mix": {"glass": 0.3, "matrix": 0.2}}, "without matrix, coating and void"),
     "no table": ({"fibres": 9, "mix": [0.3, 0.25]}, "[cell] mix = [0.3, 0.25]: expected a table by phase"),
     "radius of none": ({"mix": MIX, "fibres": 9, "radii": {"glass": 1, "carbon": 0}}, "of numbers from 1e-9 to 1e9"),
 }  # fmt: skip
@@ -113,7 +113,7 @@ BETWEEN_NUMBERS = {
     ),
     "less than half a fibre": (
         {"width": 5.0, "mix": MIX, "radii": RADII},
-        "makes 0.066 fibres of glass; expected at least 0.5, of more fibres or a wider cell",
+        "makes 0.066 fibres of glass; expected at least 0.5: give more fibres or a wider cell",
     ),
 }
 

@@ -68,7 +68,7 @@ def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
 def test_a_table_without_names_is_read_by_those_of_the_case(tmp_path, name, mark):
     text = SIZE + "\n".join(mark[:1].join(row) for row in (["7", "2", "2", "2"], ["8", "5", "4", "2.4"]))
     is_expected(case(tmp_path / name, text, columns=["number", "x", "y", "d"]).cell.table)
-    with pytest.raises(CaseError, match=r"expected names of columns, as x, y, radius, here or in \[cell\] columns = "):
+    with pytest.raises(CaseError, match=r"expected names of columns, such as x, y, radius, here or in \[cell\]"):
         case(tmp_path / name, text)
 
 

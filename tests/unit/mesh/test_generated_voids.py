@@ -103,8 +103,8 @@ def _toml(case):
 
 
 @pytest.mark.parametrize(("cell", "fault"), [
-    (RANDOM | {"voids": 0.6}, "[cell] voids = 0.6: expected true of a mesh, or a number at least 0 and at most 0.5"),
-    (RANDOM | {"voids": -0.1}, "[cell] voids = -0.1: expected true of a mesh, or a number at least 0 and at most 0.5"),
+    (RANDOM | {"voids": 0.6}, "[cell] voids = 0.6: expected true for a mesh, or a number at least 0 and at most 0.5"),
+    (RANDOM | {"voids": -0.1}, "[cell] voids = -0.1: expected true for a mesh, or a number at least 0 and at most 0.5"),
     (RANDOM | {"void_radius": 0.5}, "[cell] void_radius: belongs to voids, which is missing"),
     (RANDOM | {"voids": 0.1, "void_radius": 0.01},
      "[cell] void_radius = 0.01: expected a number at least 0.05 and at most 20"),
@@ -112,7 +112,7 @@ def _toml(case):
      '[cell] voids = 0.1: belongs to geometry = "random" or "mesh", not "square"'),
     (RANDOM | {"voids": True}, "[cell] voids = true: expected a number at least 0 and at most 0.5"),
     ({"geometry": "mesh", "file": __file__.replace(".py", ".msh"), "voids": 0.1},
-     "[cell] voids = 0.1: expected true or false: the mesh has its voids"),
+     "[cell] voids = 0.1: expected true or false: the mesh gives the voids"),
     (table([ROWS[0] | {"coating": 0.1}, ROWS[1]]), "[cell] fibre_list: row 1: coating = 0.1: a void has none"),
     (table([ROWS[0] | {"radius": -0.1}]), "[cell] fibre_list: row 1: radius = -0.1: expected a number above 0"),
 ])  # fmt: skip

@@ -187,7 +187,7 @@ def test_a_cut_window_moves_polygons():
 def test_faults_of_the_table():
     with pytest.raises(CaseError, match="row 1: has a corner, but no sides"):
         case_of({"x": 0.5, "y": 0.5, "radius": 0.1, "corner": 0.3})
-    with pytest.raises(CaseError, match=r"tip_size = 0\.01: fibre_list has polygons, and with them no nodes at tips"):
+    with pytest.raises(CaseError, match=r"tip_size = 0\.01: fibre_list has polygons, whose meshes have no"):
         case_of(SQUARE, tip_size=0.01)
 
 

@@ -126,7 +126,7 @@ def test_other_states_are_not_read(folder, tmp_path):
 def test_tables_in_the_place_of_views_and_other_labels_are_refused(folder, tmp_path):
     edits = {
         "/column/state/0/S11 is no view": lambda file: file["column/state/0"].create_dataset("S11", (3,)),
-        "a name has other letters": lambda file: file["state/0"].attrs.create("label", r"$\frac"),
+        "a name is not printable": lambda file: file["state/0"].attrs.create("label", r"$\frac"),
         "its case has other phases": lambda file: file.attrs.create("phases", ["matrix", "steel"], (2,), TEXT),
     }
     for line, edit in edits.items():

@@ -161,13 +161,13 @@ GREY = np.eye(4, dtype=np.uint8)
     [
         ("a.png", np.stack([GREY, GREY, 2 * GREY], -1), "mode RGB with colours .*: save it with a palette"),
         ("a.png", np.stack([GREY] * 4, -1), "mode RGBA with colours or transparency"),
-        ("a.tif", GREY.astype(np.float32) / 3, "4x4 values of type float32; expected a whole number"),
+        ("a.tif", GREY.astype(np.float32) / 3, "4x4 values of type float32; expected one whole number"),
         ("a.npy", np.stack([GREY] * 3), "3x4x4 values of type uint8; .* in rows; cut one layer out of a stack"),
-        ("a.png", np.arange(144, dtype=np.uint8).reshape(12, 12), "make labels by a threshold, or fibres --image"),
-        ("a.npy", 0.5 * GREY, "4x4 values of type float64; expected a whole number a pixel, in rows"),
+        ("a.png", np.arange(144, dtype=np.uint8).reshape(12, 12), "or into a table by fibres --image"),
+        ("a.npy", 0.5 * GREY, "4x4 values of type float64; expected one whole number a pixel, in rows"),
         ("a.npy", GREY[:1], "4 x 1 pixels; expected two rows"),
         ("a.npz", [GREY, GREY], "2 arrays; expected one"),
-        ("a.png", 2 * GREY, "no phase of 2; a.png has 0: 75 %, 2: 25 %"),
+        ("a.png", 2 * GREY, "no phase for 2; a.png has 0: 75 %, 2: 25 %"),
         ("a.npy", np.array([{}] * 4, object), "cannot be read: Object arrays"),
     ],
 )

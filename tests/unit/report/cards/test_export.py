@@ -47,7 +47,7 @@ def test_devices_and_pipes_are_not_replaced(tmp_path):
     ("name", "words"),
     [
         ("", "expected a file, but it is a folder"),
-        ("nowhere/card.inp", "expected a file in a folder that there is"),
+        ("nowhere/card.inp", "expected a file in an existing folder"),
         ("result.json", "expected another name; results have files of that name"),
     ],
 )
