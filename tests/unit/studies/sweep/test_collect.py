@@ -82,6 +82,7 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     )
     assert [row["case"] for row in rows] == list("123456") and rows[0]["elements"].isdigit()
     assert rows[5]["status"] == "waiting" and rows[5]["bulk"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
+    assert [*statistics[0]] == ["point", "cell.fibre_fraction", "output", "unit", "count", "mean", "std", "ci95"]
     bulk = [row for row in statistics if row["output"] == "bulk"]
     assert [float(row["mean"]) for row in bulk] == pytest.approx([97.5, 109.25])
     assert [(row["point"], row["cell.fibre_fraction"], row["unit"], row["count"]) for row in bulk] == [
@@ -223,11 +224,13 @@ def test_angles_in_space_have_all_entries():
 
 
 def test_what_varies_along_is_no_other_series():
-    documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
-    inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
-    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    """Nor a key of one value; points of a series are in rising order."""
+    counts = [8, 4, 4, 8]
+    sizes = {"cell.mesh_size": [0.2, 0.3, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2], "cell.order": [1] * 4}
+    documents = [document(0.4, fibres, 0.0) for fibres in counts]
+    found = series_over(collected({"cell.fibres": counts} | sizes, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
-        ("fibre young 1 GPa", [1, 2], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
+        ("fibre young 1 GPa", [2, 1], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip
 
 

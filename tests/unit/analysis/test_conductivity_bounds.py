@@ -1,0 +1,33 @@
+"""Conductivities outside their bounds: Hashin and Shtrikman's of isotropic cells, Wiener's of all others."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from feti_homog.analysis import conductivity
+from feti_homog.materials.phase_bounds import ConductivityEstimates
+
+FORMS = ConductivityEstimates(1.0, (0.5, 2.0), (0.8, 1.5), None)
+TURN = np.array([[0.6, -0.8], [0.8, 0.6]])
+
+
+@pytest.mark.parametrize(
+    ("across", "outside"),
+    [
+        ((1.0, 1.0), []),
+        ((1.7, 1.7), ["1.7 is outside its bounds, 0.8 and 1.5"] * 2),
+        ((0.6, 1.7), []),
+        ((0.4, 1.7), ["0.4 is outside its bounds, 0.5 and 2"]),
+        ((0.6, 2.5), ["2.5 is outside its bounds, 0.5 and 2"]),
+    ],
+)
+def test_principal_conductivities_outside_their_bounds_are_faults(across, outside):
+    checks, notes = SimpleNamespace(faults=[]), []
+    case = SimpleNamespace(cell=SimpleNamespace(boundary="periodic"))
+    k = np.diag([0.0, 0.0, 9.0])
+    k[:2, :2] = TURN @ np.diag(across) @ TURN.T
+    context = SimpleNamespace(case=case, checks=checks, notes=notes)
+    conductivity._note_bounds(context, k, np.full((3, 3), 1e-3), FORMS, 1e-3)
+    assert not notes and len(checks.faults) == len(outside)
+    assert all(words in line for words, line in zip(outside, checks.faults, strict=True))
