@@ -3,6 +3,7 @@
 import os
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -94,6 +95,20 @@ def test_replaced_events_give_their_room_back(tmp_path):
         for _ in range(4 * EVENTS):
             write(events, 0)
         assert events.count() == 1 and "lam" in events.read(0)
+
+
+def test_events_with_many_equilibria_or_all_fields_have_no_limit():
+    states = {"friction": (True, 2), "all": (False, "all"), "some": (False, 2)}
+    cases = {k: SimpleNamespace(has_friction=f, output=SimpleNamespace(states=s)) for k, (f, s) in states.items()}
+    limit = checkpoints.WHOLE_BYTES
+    assert {k: checkpoints.room_of(case) for k, case in cases.items()} == {"friction": None, "all": None, "some": limit}
+
+
+def test_events_without_room_keep_what_no_equilibrium_finds_again():
+    events = EventsInMemory(MPI.COMM_SELF, 0)
+    found = [f"{name}{end}" for name in ("lam", "jump", "used", "alpha") for end in ("", "_axial")]
+    events.write(0, {"load": 1.0}, {name: np.zeros(1) for name in (*found, "status", "damage", "sliding")})
+    assert {*events.read(0)} == {"load", "status", "damage", "sliding"}
 
 
 def test_events_survive_a_power_failure_unless_cheap(tmp_path, monkeypatch):
