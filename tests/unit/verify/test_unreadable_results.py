@@ -78,6 +78,7 @@ DAMAGES = {
     "another schema": document(lambda content: content.update(schema=99)),
     "no case": document(lambda content: content.pop("case")),
     "no solver": document(lambda content: content.pop("solver")),
+    "a text for the solver": document(lambda content: content.update(solver="none")),
     "no material": document(lambda content: content["case"].update(material={})),
     "a list": lambda folder: (folder / "result.json").write_text("[1, 2]"),
 }
