@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from feti_homog import Case, run
 from feti_homog.analysis import conductivity
+from feti_homog.errors import ConvergenceError
 from feti_homog.materials.phase_bounds import ConductivityEstimates
 
 FORMS = ConductivityEstimates(1.0, (0.5, 2.0), (0.8, 1.5), None)
@@ -31,3 +34,17 @@ def test_principal_conductivities_outside_their_bounds_are_faults(across, outsid
     conductivity._note_bounds(context, k, np.full((3, 3), 1e-3), FORMS, 1e-3)
     assert not notes and len(checks.faults) == len(outside)
     assert all(words in line for words, line in zip(outside, checks.faults, strict=True))
+
+
+def test_a_run_compares_its_conductivity_with_its_bounds(monkeypatch):
+    case = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+        "material": {"matrix": {"conductivity": 1.0}, "fibre": {"conductivity": 2.0}},
+        "analysis": {"type": "conductivity"},
+    }
+    assert not run(Case.parse(case), MPI.COMM_SELF).faults
+    above = ConductivityEstimates(1.4, (5.0, 6.0), (5.0, 6.0), None)
+    monkeypatch.setattr(conductivity, "closed_forms", lambda cell: above)
+    with pytest.raises(ConvergenceError) as error:
+        run(Case.parse(case), MPI.COMM_SELF)
+    assert [line.partition(" = ")[0] for line in error.value.faults] == ["k across, least", "k across, largest"]
