@@ -39,10 +39,12 @@ def test_principal_conductivities_outside_their_bounds_are_faults(across, outsid
 def test_a_run_compares_its_conductivity_with_its_bounds(monkeypatch):
     case = {
         "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-        "material": {"matrix": {"conductivity": 1.0}, "fibre": {"conductivity": 2.0}},
+        "material": {"matrix": {"conductivity": 1.0}, "fibre": {"conductivity": {"axial": 9.0, "transverse": 2.0}}},
         "analysis": {"type": "conductivity"},
     }
-    assert not run(Case.parse(case), MPI.COMM_SELF).faults
+    result = run(Case.parse(case), MPI.COMM_SELF)
+    assert not result.faults
+    assert result.conductivity_estimates.axial == pytest.approx(result.effective_conductivity[2, 2], rel=1e-12)
     above = ConductivityEstimates(1.4, (5.0, 6.0), (5.0, 6.0), None)
     monkeypatch.setattr(conductivity, "closed_forms", lambda cell: above)
     with pytest.raises(ConvergenceError) as error:
