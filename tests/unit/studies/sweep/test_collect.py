@@ -246,7 +246,9 @@ def test_what_varies_along_is_no_other_series():
     counts = [8, 4, 4, 8]
     sizes = {"cell.mesh_size": [0.2, 0.3, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2], "cell.order": [1] * 4}
     documents = [document(0.4, fibres, 0.0) for fibres in counts]
-    found = series_over(collected({"cell.fibres": counts} | sizes, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    table = collected({"cell.fibres": counts} | sizes, documents, [1, 2, 3, 4], [1] * 4)
+    assert table.label(1) == "8 fibres, mesh size 0.2, fibre young 1 GPa"
+    found = series_over(table, "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
         ("fibre young 1 GPa", [2, 1], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip
