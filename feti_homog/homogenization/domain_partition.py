@@ -127,7 +127,7 @@ def distribute(
 
     Raises CaseError if an arc lies on a fibre that cannot have arcs, or selects no node.
     """
-    torus = Torus.of(mesh)
+    torus, halves = Torus.of(mesh), mesh.triangles.shape[1] - 2  # a pixel is two triangles
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)
     circles, pairs = mesh_fibres.fibre_circles(torus), cell_remarks.pairs_of(case, mesh.phases)
     centres = in_cell(circles[:, :2], mesh.period) if mesh.boundary == "periodic" else circles[:, :2]
@@ -140,7 +140,6 @@ def distribute(
         moved, faults = arc_selection.checked(case, nodes, centres[is_fibre], faults)
     if faults:
         raise CaseError(*faults)
-    triangles = len(mesh.triangles) * (halves := mesh.triangles.shape[1] - 2)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, across = int(parts.max()) + 1, (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
@@ -150,7 +149,8 @@ def distribute(
         pieces = partition_policy.wanted_pieces(case, halves * load, shared_edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, np.minimum(pieces, load), n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
-    radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
+    radii, triangles = circles[is_fibre, 2], halves * len(mesh.triangles)
+    text = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
     bonds = _interface_nodes(torus, pairs, lattice, pinned) if across or len(case.interfaces) else 0
     summary = CellSummary(
         width=mesh.width,

@@ -19,7 +19,7 @@ from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.homogenization.uniform_parts import UniformPart, locks
-from feti_homog.mesh import ReferenceLattice, Submesh, submeshes
+from feti_homog.mesh import ReferenceLattice, Submesh, refinement, submeshes
 from feti_homog.microstructure import phase_names
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
@@ -254,7 +254,7 @@ def assemble_subdomains(
 
     def assembled() -> list[Subdomain]:
         problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()
-        for s in part.submeshes.cut():
+        for s in map(refinement.halved, part.submeshes.cut()):
             phase_of = summary.constituent_phase[s.constituent]
             material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
             mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))

@@ -48,7 +48,7 @@ class CoarseMesh:
         width, height: cell periods.
         points: (n, 2) nodes in the plane.
         triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
-            square pixels, the lower left corner first, from which `submeshes.halved` makes triangles.
+            square pixels, the lower left corner first, from which `refinement.halved` makes triangles.
         phase: (m,) index into `phases`, whose first name is "matrix".
         precedence: (m,) sort key by which constituents are numbered: 0 in the matrix, else the fibre number, or the
             phase if fibres have no numbers.

@@ -12,11 +12,11 @@ and across the fewest sides; fine nodes follow the coarse triangles.  The fill i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import edge_keys, edges
+from feti_homog.mesh.coarse_mesh import HALVES, edge_keys, edges
 from feti_homog.mesh.periodic_topology import edge_pairs
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -25,6 +25,8 @@ from feti_homog.typing import Bool, Float, Int, Int32
 OFF_THE_MIDDLE = 0.1
 # Fewest intervals a side with which dissection also orders the many inner nodes of a coarse triangle.
 MANY_INTERVALS = 8
+# The edges of `coarse_mesh.HALVES`; the diagonal is edge 4.
+SIDES = np.array([[[0, 1, 4], [4, 2, 3]], [[0, 4, 3], [1, 2, 4]]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +125,32 @@ class FineMesh:
         """The plane nodes (m, 3 or 6) of the elements: vertices, then mid-edge nodes 01, 12, 20."""
         elements = self.lattice.triangles
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
+
+
+def halved(pixels: Submesh) -> Submesh:
+    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals between nodes of an even sum of row and column.
+
+    A submesh of triangles remains as it is.
+    """
+    corners, m = pixels.triangles, len(pixels.triangles)
+    if corners.shape[1] == 3:
+        return pixels
+    low = pixels.points[corners[:, 0]]
+    is_odd = (np.rint(low.sum(axis=1) / np.ptp(pixels.points[corners[0], 0])) % 2).astype(np.int64)
+    sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
+    # The class of the lower left corner numbers a diagonal, behind the edges of all pixels.
+    keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
+    names = ("circles", "turns", "at_void", "debonded")
+    diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}
+    diagonals |= {"edge_keys": np.iinfo(np.int32).max + keys, "edge_class": len(pixels.edge_keys) + place}
+    diagonals["edges"] = np.where(is_odd[:, None] == 1, corners[:, [3, 1]], corners[:, [0, 2]])
+    return replace(
+        pixels,
+        **{name: np.concatenate([getattr(pixels, name), rows]) for name, rows in diagonals.items()},
+        constituent=np.repeat(pixels.constituent, 2),
+        triangles=np.take_along_axis(corners[:, None], HALVES[is_odd], axis=2).reshape(-1, 3),
+        triangle_edges=np.take_along_axis(sides[:, None], SIDES[is_odd], axis=2).reshape(-1, 3),
+    )
 
 
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:

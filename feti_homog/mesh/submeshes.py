@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import HALVES, on_sides
+from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
@@ -20,8 +20,6 @@ ROWS = (
     ("touching", "class_keys"),
     ("at_void", "debonded", "edge_keys"),
 )
-# The edges of `coarse_mesh.HALVES`; the diagonal is edge 4.
-SIDES = np.array([[[0, 1, 4], [4, 2, 3]], [[0, 4, 3], [1, 2, 4]]])
 
 
 @dataclass(frozen=True)
@@ -138,10 +136,9 @@ class SubmeshesOfRank:
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
-        """Cut the triangles of the rank into one submesh for each subdomain."""
+        """Cut the triangles or pixels of the rank into one submesh for each subdomain."""
         members = np.split(np.argsort(self.member, kind="stable"), np.cumsum(self.loads))[:-1]
-        is_image = self.whole.triangles.shape[1] == 4
-        pieces = [halved(piece) if is_image else piece for piece in (part(self.whole, some) for some in members)]
+        pieces = [part(self.whole, triangles) for triangles in members]
         table = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
         return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in table]
 
@@ -189,27 +186,6 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         vertex_class=vertex_class,
         edge_class=edge_class,
         pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),
-    )
-
-
-def halved(pixels: Submesh) -> Submesh:
-    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals, which join nodes of an even sum of row and column."""
-    corners, m = pixels.triangles, len(pixels.triangles)
-    low = pixels.points[corners[:, 0]]
-    is_odd = (np.rint(low.sum(axis=1) / np.ptp(pixels.points[corners[0], 0])) % 2).astype(np.int64)
-    sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
-    # The class of the lower left corner numbers a diagonal, behind the edges of all pixels.
-    keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
-    names = ("circles", "turns", "at_void", "debonded")
-    diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}
-    diagonals |= {"edge_keys": np.iinfo(np.int32).max + keys, "edge_class": len(pixels.edge_keys) + place}
-    diagonals["edges"] = np.where(is_odd[:, None] == 1, corners[:, [3, 1]], corners[:, [0, 2]])
-    return replace(
-        pixels,
-        **{name: np.concatenate([getattr(pixels, name), rows]) for name, rows in diagonals.items()},
-        constituent=np.repeat(pixels.constituent, 2),
-        triangles=np.take_along_axis(corners[:, None], HALVES[is_odd], axis=2).reshape(-1, 3),
-        triangle_edges=np.take_along_axis(sides[:, None], SIDES[is_odd], axis=2).reshape(-1, 3),
     )
 
 

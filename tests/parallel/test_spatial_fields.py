@@ -53,4 +53,4 @@ def _fits(whole: Any) -> bool:
 
 def _areas(mesh: Any) -> np.ndarray:
     a, b, c = np.moveaxis(mesh.points[mesh.triangles[:, :3]], 1, 0)
-    return np.asarray(np.cross(b - a, c - a) / 2)
+    return np.linalg.det(np.stack([b - a, c - a], axis=1)) / 2

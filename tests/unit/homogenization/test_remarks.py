@@ -29,6 +29,13 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
 
 
+@pytest.mark.parametrize(("boundary", "bound"), [("displacement", "an upper"), ("traction", "a lower")])
+def test_conditions_on_sides_bound_the_result(boundary, bound):
+    """Given displacements leave less freedom than periodic ones, tractions more."""
+    (line,) = case_remarks(SimpleNamespace(cell=SimpleNamespace(boundary=boundary)))
+    assert line == f'[cell] boundary = "{boundary}": the result is {bound} bound of the effective one'
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_onsets_by_linear_elements_have_a_remark(order):
     content = tomllib.loads(VALID_CASES["base"]) | {"interface": {"normal_strength": 1.0}}

@@ -1,5 +1,7 @@
 """report.html without a browser: what is on the page, and what of a folder that has no whole result."""
 
+import base64
+import re
 import tomllib
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -164,6 +166,38 @@ def test_the_page_of_a_cell_in_space(tmp_path: Path, result: Callable[[], dict[s
     assert cards == [f"Material card, {form}" for form in export.FORMATS] * (result is space)
     if cards:
         assert words.verbatim[1:-1] == [export.card(tmp_path, form, "orthotropic") for form in export.FORMATS]
+
+
+CAPTIONS = {
+    "case_gamma12": "Deformed cell under gamma12",
+    "case_minus_E11": "Deformed cell under minus E11",
+    "case_dT_dx1": "Flux and isotherms under a unit gradient along x1",
+    "case_dT_dx2": "Flux and isotherms under a unit gradient along x2",
+    "mesh_error": "Estimated error of the mesh",
+    "sensitivities": "Relative changes of constants with each parameter",
+    "state_7": "Deformed cell, state 7",
+}
+
+
+def test_pictures_stand_above_their_own_words(tmp_path: Path) -> None:
+    for name in CAPTIONS:
+        (tmp_path / f"{name}.png").write_bytes(name.encode())
+    text = page.write(written(tmp_path, bonded())).read_text(encoding="utf-8")
+    figure = re.compile(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"><figcaption>([^<]+)</figcaption>')
+    assert {base64.b64decode(data).decode(): alt for data, alt, _ in figure.findall(text)} == CAPTIONS
+    assert all(alt == caption for _, alt, caption in figure.findall(text))
+
+
+@pytest.mark.parametrize(("status", "verdict"), [("done", "good"), ("not converged", "bad")])
+def test_the_head_has_the_verdict_and_remarks_are_words(tmp_path: Path, status: str, verdict: str) -> None:
+    result = document("stiffness", **bonded_numbers(), status=status, remarks=["a <script>"], warnings=["<i>"])
+    text = page.write(written(tmp_path, result)).read_text(encoding="utf-8")
+    assert f'<p class="status {verdict}">{status}</p>' in text and not {"script", "i"} & {*Words(text).tags}
+    assert '<p class="remark"><strong>Remark</strong> a &lt;script&gt;</p>' in text
+    assert '<p class="warning"><strong>Warning</strong> &lt;i&gt;</p>' in text
+    (policy,) = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]+)">', text)
+    allowed = dict(each.split(" ", 1) for each in policy.split("; "))
+    assert allowed == {"default-src": "'none'", "style-src": "'unsafe-inline'", "img-src": "data:"}
 
 
 def test_an_older_result_has_no_date(tmp_path: Path) -> None:

@@ -1,20 +1,25 @@
 """Checkpoints: what is read is what was written, or is refused."""
 
+import os
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import CaseError
+from feti_homog.results import checkpoints
 from feti_homog.results.checkpoints import (
     FORMAT,
     PREFIX,
     Checkpoint,
     EventsInMemory,
+    packed,
     records,
     refuse_others,
+    unpacked,
 )
 
 EVENTS = 4
@@ -85,6 +90,46 @@ def test_an_event_takes_the_place_of_all_from_its_number_on(tmp_path, count):
     assert checkpoint.count() == count + 1 and same(map(checkpoint.read, range(count + 1)))
 
 
+def test_replaced_events_give_their_room_back(tmp_path):
+    for events in (Checkpoint(tmp_path, MPI.COMM_SELF, "this run", 300), EventsInMemory(MPI.COMM_SELF, 300)):
+        for _ in range(4 * EVENTS):
+            write(events, 0)
+        assert events.count() == 1 and "lam" in events.read(0)
+
+
+def test_events_with_many_equilibria_or_all_fields_have_no_limit():
+    states = {"friction": (True, 2), "all": (False, "all"), "some": (False, 2)}
+    cases = {k: SimpleNamespace(has_friction=f, output=SimpleNamespace(states=s)) for k, (f, s) in states.items()}
+    limit = checkpoints.WHOLE_BYTES
+    assert {k: checkpoints.room_of(case) for k, case in cases.items()} == {"friction": None, "all": None, "some": limit}
+
+
+def test_events_without_room_keep_what_no_equilibrium_finds_again():
+    events = EventsInMemory(MPI.COMM_SELF, 0)
+    found = [f"{name}{end}" for name in ("lam", "jump", "used", "alpha") for end in ("", "_axial")]
+    events.write(0, {"load": 1.0}, {name: np.zeros(1) for name in (*found, "status", "damage", "sliding")})
+    assert {*events.read(0)} == {"load", "status", "damage", "sliding"}
+
+
+def test_events_survive_a_power_failure_unless_cheap(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(descriptor))
+    checkpoint = written(tmp_path)
+    for number, light in ((EVENTS, False), (EVENTS + 1, True)):
+        before = len(synced)
+        write(checkpoint, number, light)
+        assert (len(synced) > before) is not light
+
+
+def test_an_event_that_grows_beyond_all_events_is_refused(monkeypatch):
+    """As of a compressed file of zeros."""
+    content = packed({"lam": np.zeros(10**6)})
+    assert unpacked(content)["lam"].shape == (10**6,)
+    monkeypatch.setattr(checkpoints, "WHOLE_BYTES", 1000)
+    with pytest.raises(CaseError, match="an event of the checkpoint is damaged"):
+        unpacked(content)
+
+
 def test_other_files_are_refused(tmp_path):
     written(tmp_path)
     with pytest.raises(CaseError, match=r"--resume: .*events is of another run: expected that; found this run"):
@@ -147,6 +192,12 @@ def test_a_folder_of_others_is_refused(tmp_path, name, content):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("mine")
     with pytest.raises(CaseError, match=f"no run of this program wrote {name}/"):
+        refuse_others(tmp_path)
+
+
+def test_a_folder_in_the_place_of_events_is_refused(tmp_path):
+    (tmp_path / "checkpoint/events").mkdir(parents=True)
+    with pytest.raises(CaseError, match="no run of this program wrote checkpoint/events"):
         refuse_others(tmp_path)
 
 

@@ -34,6 +34,7 @@ ATTRIBUTES = {
         (h5py.Empty("f8"), "/width is float64 None"),
         (np.nan, "/width has the number nan"),
         (1e99, "other nodes"),
+        (10.0, "a cell of 10 x .*, refine = 0, has other nodes"),
     ),
     ("/", "refine"): (
         (1.0, r"/refine is float64 \(\), expected int64 \(\)"),
@@ -64,6 +65,11 @@ NUMBERS = {
     "a negative radius": ("fibre/radius", -1.0, "/fibre/radius has the number -1"),
     "an endless stress": ("state/0/stress", np.inf, "/state/0/stress has the number inf"),
     "an unknown status": ("state/0/status", 3, "/state/0/status has the number 3, expected 0 to 2"),
+    "damage that is none": ("state/0/damage", np.nan, "/state/0/damage has the number nan"),
+    "a long normal": ("interface/normal", 2.0, "/interface/normal has the number 2, expected -1.01 to 1.01"),
+    "an unknown pair": ("interface/pair", -1, "/interface/pair has the number -1, expected 0 to 1000"),
+    "a negative length": ("interface/length", -1.0, "/interface/length has the number -1"),
+    "a fibre without a number": ("fibre/number", 0, "/fibre/number has the number 0, expected 1 to 2"),
     "damage beyond 1": ("state/0/damage", 1.5, "/state/0/damage has the number 1.5"),
 }
 
@@ -123,19 +129,48 @@ def test_other_states_are_not_read(folder, tmp_path):
         read_state(tmp_path, 1)
 
 
-def test_tables_in_the_place_of_views_and_other_labels_are_refused(folder, tmp_path):
-    edits = {
-        "/column/state/0/S11 is no view": lambda file: file["column/state/0"].create_dataset("S11", (3,)),
-        "a name is not printable": lambda file: file["state/0"].attrs.create("label", r"$\frac"),
-        "its case has other phases": lambda file: file.attrs.create("phases", ["matrix", "steel"], (2,), TEXT),
-    }
-    for line, edit in edits.items():
-        with h5py.File(shutil.copy(folder / "result.h5", tmp_path), "r+") as file:
-            if "column" in line:
-                del file["column/state/0/S11"]
-            edit(file)
-        with pytest.raises(CaseError, match=line):
-            read_state(tmp_path)
+def viewed(file, source, **more):
+    """Put a view of the first column of `source`, a file and table, in the place of a view."""
+    layout = h5py.VirtualLayout(shape := file["column/state/0/S11"].shape, "f8")
+    del file["column/state/0/S11"]
+    layout[:] = h5py.VirtualSource(*source, (*shape, 3))[:, 0]
+    file.create_virtual_dataset("column/state/0/S11", layout, **more)
+
+
+OWN, S11 = (".", "/state/0/stress"), "/column/state/0/S11 is no"
+EDITS = {
+    "a table for a view": (
+        f"{S11} view",
+        lambda file: (file.pop("column/state/0/S11"), file.create_dataset(S11[:-6], (3,))),
+    ),
+    "a filled view": (f"{S11} view", lambda file: viewed(file, OWN, fillvalue=1.0)),
+    "a view of another file": (f"{S11}t a table", lambda file: viewed(file, ("other.h5", OWN[1]))),
+    "raw data of another file": (
+        "/x is not a table",
+        lambda file: file.create_dataset("x", 3, external=[("y", 0, 24)]),
+    ),
+    "a table without data": ("/x is not a table", lambda file: file.create_dataset("x", 10**7, chunks=99)),
+    "a formula": ("a name is not printable", lambda file: file["state/0"].attrs.create("label", r"$\frac")),
+    "two lines": ("a name is not printable", lambda file: file["state/0"].attrs.create("label", "a\nb")),
+    "other phases": ("other phases", lambda file: file.attrs.create("phases", ["matrix", "steel"], (2,), TEXT)),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_other_tables_views_and_labels_are_refused(folder, tmp_path, name):
+    line, edit = EDITS[name]
+    with h5py.File(shutil.copy(folder / "result.h5", tmp_path), "r+") as file:
+        edit(file)
+    with pytest.raises(CaseError, match=line):
+        read_state(tmp_path)
+
+
+def test_all_rows_of_a_long_table_are_compared():
+    rows = np.zeros(200_000)
+    for wrong in (0, 70_000, len(rows) - 1):
+        field_guard._require_values("/x", "damage", {}, rows)
+        with pytest.raises(CaseError, match="/x has the number 2, expected -1e-06 to 1"):
+            field_guard._require_values("/x", "damage", {}, np.where(np.arange(len(rows)) == wrong, 2.0, rows))
 
 
 def test_deeply_nested_documents_are_refused(tmp_path):

@@ -78,6 +78,7 @@ DAMAGES = {
     "another schema": document(lambda content: content.update(schema=99)),
     "no case": document(lambda content: content.pop("case")),
     "no solver": document(lambda content: content.pop("solver")),
+    "a text for the solver": document(lambda content: content.update(solver="none")),
     "no material": document(lambda content: content["case"].update(material={})),
     "a list": lambda folder: (folder / "result.json").write_text("[1, 2]"),
 }
@@ -91,6 +92,7 @@ def test_unreadable_results_are_reported_in_one_line(result, tmp_path, name, cap
         verify(copy)
     (fault,) = caught.value.faults
     assert "\n" not in fault and ("result" in fault or str(copy) in fault) and "Error" not in fault
+    assert "crashes" not in fault
     assert main(["verify", str(copy)]) == 2
     errors = capsys.readouterr().err  # sizes are compared before verify reads
     assert errors.startswith("error: ") and errors.count("\n") == 1 and "result" in errors

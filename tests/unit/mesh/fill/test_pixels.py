@@ -11,7 +11,7 @@ from support.pixel_images import quadrilaterals, random_image
 
 from feti_homog import Case, run
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.mesh import Torus
+from feti_homog.mesh import Torus, refinement
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill import pixel_mesher
 from feti_homog.mesh.submeshes import SubdomainTable, cut_for_ranks, pinned_classes
@@ -234,7 +234,7 @@ def test_halves_of_pixels_share_diagonals_between_even_nodes(tmp_path, cell):
     table = SubdomainTable.of(torus, subdomain, np.zeros(3, np.int64), across=True)
     (own,) = cut_for_ranks(torus, subdomain, table, 1, pinned_classes(torus))
     found = []
-    for number, submesh in enumerate(own.cut()):
+    for number, submesh in enumerate(map(refinement.halved, own.cut())):
         triangles, ends = submesh.triangles, submesh.edges[submesh.triangle_edges]
         sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
         forwards = np.where(submesh.backwards[..., None], sides[..., ::-1], sides)
@@ -261,6 +261,24 @@ def test_voids_part_nothing_and_leave_sides_to_tractions(tmp_path):
 
 
 SOLID_AND_VOID = {"0": "matrix", "2": "void"}
+
+
+def test_parts_join_across_the_period_alone(tmp_path):
+    image = np.zeros((6, 6), int)
+    image[:, 3], image[0, 0] = 2, 1
+    with_voids(tmp_path, image)
+    with pytest.raises(MeshError, match=r"floating parts, .*: that of 12 pixels with the one in row 6, column 5"):
+        with_voids(tmp_path, image, boundary="displacement")
+
+
+def test_no_corner_of_smooth_outlines_lies_in_a_void(tmp_path):
+    """Although each row and column crosses one of two voids."""
+    x = np.arange(48) + 0.5
+    image = np.any([np.hypot(x[None] - c, x[:, None] - c) < 13 for c in (12, 36)], axis=0).astype(int)
+    mesh = pixel_mesher.read_cell(case(tmp_path / "a.npy", image, ("matrix", "void"), smooth=True, order=2).cell)
+    corners = [[0.0, 0.0], [48.0, 0.0], [48.0, 48.0], [0.0, 48.0]]
+    assert all((mesh.points == corner).all(axis=1).any() for corner in corners)
+    assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(48**2 - 2 * np.pi * 13**2, rel=0.03)
 
 
 def test_damaged_and_large_images_are_refused(tmp_path):

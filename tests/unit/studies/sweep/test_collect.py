@@ -10,7 +10,7 @@ from support.sweep_tables import collected, document, path_document
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
 from feti_homog.report.text.tables import unit, with_unit
-from feti_homog.studies import collect, pictures
+from feti_homog.studies import case_folders, collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.sweep_table import Statistics, series_over
 
@@ -82,6 +82,7 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     )
     assert [row["case"] for row in rows] == list("123456") and rows[0]["elements"].isdigit()
     assert rows[5]["status"] == "waiting" and rows[5]["bulk"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
+    assert [*statistics[0]] == ["point", "cell.fibre_fraction", "output", "unit", "count", "mean", "std", "ci95"]
     bulk = [row for row in statistics if row["output"] == "bulk"]
     assert [float(row["mean"]) for row in bulk] == pytest.approx([97.5, 109.25])
     assert [(row["point"], row["cell.fibre_fraction"], row["unit"], row["count"]) for row in bulk] == [
@@ -93,6 +94,24 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     assert [float(row["mean"]) for row in (first, second)] == [136.5, 152.25]
     assert [float(row["ci95"]) for row in (first, second)] == pytest.approx(halves)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cases.csv", "statistics.csv"]
+
+
+def test_each_case_is_listed_by_its_status_and_done_ones_alone_count(tmp_path, monkeypatch):
+    """Numbers of a running path are in its row; those of a refused or damaged result are nowhere."""
+    states = {status: (f"because {status}", path_document(2, 0.0)) for status in case_folders.Status}
+    entries = [case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k, _ in enumerate(states, start=1)]
+    index = case_folders.SweepIndex("test", "GPa", tuple(entries))
+    found = [case_folders.CaseState(status, *more) for status, more in states.items()]
+    monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
+    first, *lines = collect.collect(tmp_path, pictures=False)
+    assert first == "7 cases: " + ", ".join(f"1 {status}" for status in states)
+    text = "\n".join(lines)
+    assert all(f"because {status}" in text for status in ("failed", "not converged", "damaged", "running"))
+    assert "3 failed:" in lines and "because done" not in text
+    table = collect.read(tmp_path)
+    assert table.finished == [states["done"][1]]
+    known = [status for status, peak in zip(table.status, table.outputs["peak_S11"], strict=True) if np.isfinite(peak)]
+    assert known == ["done", "running", "interrupted"] and table.statistics["peak_S11"].count == 1.0
 
 
 def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
@@ -223,11 +242,15 @@ def test_angles_in_space_have_all_entries():
 
 
 def test_what_varies_along_is_no_other_series():
-    documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
-    inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
-    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    """Nor a key of one value; points of a series are in rising order."""
+    counts = [8, 4, 4, 8]
+    sizes = {"cell.mesh_size": [0.2, 0.3, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2], "cell.order": [1] * 4}
+    documents = [document(0.4, fibres, 0.0) for fibres in counts]
+    table = collected({"cell.fibres": counts} | sizes, documents, [1, 2, 3, 4], [1] * 4)
+    assert table.label(1) == "8 fibres, mesh size 0.2, fibre young 1 GPa"
+    found = series_over(table, "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
-        ("fibre young 1 GPa", [1, 2], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
+        ("fibre young 1 GPa", [2, 1], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip
 
 

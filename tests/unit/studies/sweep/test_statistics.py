@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,7 +64,25 @@ def test_noise_and_costs_have_no_statistics(tmp_path, scale):
     assert {line.split()[0] for line in printed} == {"peak_S12", "peak_S22", "peak_E11"}
 
 
-def test_a_single_realisation_has_no_scatter():
-    _, title, heads, *rows = collect.means(collected({"cell.order": [1]}, [path_document(2, 0.0)], [1], [1]))
+def test_numbers_so_far_of_an_unfinished_case_are_in_its_row_alone():
+    table = replace(whole := samples(1.0), documents=[*whole.documents[:2], None])
+    assert table.outputs["peak_S22"].tolist() == [3.0, 4.0, 5.0]
+    found = table.statistics["peak_S22"]
+    assert (found.count, found.mean, found.std) == pytest.approx((2.0, 3.5, 0.5**0.5))
+
+
+def test_a_single_realisation_has_no_scatter(tmp_path):
+    table = collected({"cell.order": [1]}, [path_document(2, 0.0)], [1], [1])
+    collect.write(tmp_path, table)
+    rows = {row["output"]: row for row in csv.DictReader((tmp_path / "statistics.csv").read_text().splitlines())}
+    assert [rows["peak_S11"][name] for name in ("count", "mean", "std", "ci95")] == ["1", "4.0", "", ""]
+    _, title, heads, *rows = collect.means(table)
     assert title == "Results" and "std" not in heads and "peak_S11" in heads and len(rows) == 1
     assert collect.means(collected({"cell.order": [1]}, [None], [1], [1])) == []
+
+
+def test_the_first_of_many_points_are_printed():
+    count = collect.MOST_ROWS + 10
+    steps = [*range(1, count + 1)]
+    _, title, _, *rows = collect.means(collected({"cell.order": steps}, [path_document(2, 0.0)] * count, steps, steps))
+    assert title == f"Results, {collect.MOST_ROWS} of {count} points" and len(rows) == collect.MOST_ROWS
