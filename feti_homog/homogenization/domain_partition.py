@@ -144,13 +144,11 @@ def distribute(
     bodies, across = int(parts.max()) + 1, (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
-        shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
-        load = np.bincount(parts)
-        pieces = partition_policy.wanted_pieces(case, halves * load, shared_edges, lattice, n_ranks, policy)
-        cut = partition.decompose(torus, parts, np.minimum(pieces, load), n_ranks)
+        edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
+        pieces = partition_policy.wanted_pieces(case, halves * np.bincount(parts), edges, lattice, n_ranks, policy)
+        cut = partition.decompose(torus, parts, np.minimum(pieces, np.bincount(parts)), n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
-    radii, triangles = circles[is_fibre, 2], halves * len(mesh.triangles)
-    text = cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), triangles)
+    radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), halves * len(parts))
     bonds = _interface_nodes(torus, pairs, lattice, pinned) if across or len(case.interfaces) else 0
     summary = CellSummary(
         width=mesh.width,
@@ -158,7 +156,7 @@ def distribute(
         phases=mesh.phases,
         bodies=bodies,
         subdomains=len(cut.rank),
-        coarse_triangles=triangles,
+        coarse_triangles=halves * len(parts),
         interface_edge=float(torus.edge_lengths[torus.is_outline].max(initial=0.0)),
         numbers=numbers,
         is_fibre=is_fibre,
