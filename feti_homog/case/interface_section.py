@@ -183,8 +183,8 @@ class InterfaceSection:
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
     mixing_exponent: float = pair_key(
-        types.real(above=0.0),
-        "Exponent of Benzeggagh and Kenane's toughness.",
+        types.real(least=0.5, most=100.0),
+        "Exponent of Benzeggagh and Kenane's toughness, whose slope over the mode angle has no bound below 0.5.",
         default=2.0,
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
