@@ -62,8 +62,7 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     Raises:
         CaseError: the file is damaged or too large, or has not exactly one image.
     """
-    memory = 128 * types.MOST_PIXELS
-    image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
+    image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), 128 * types.MOST_PIXELS)
     if not is_grey and image.dtype.kind == "f" and np.array_equal(image, np.rint(image)):
         image = image.astype(np.int64)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):

@@ -3,6 +3,7 @@
 A library that may crash on a damaged file reads the file in a separate process.
 """
 
+import ctypes
 import errno
 import math
 import multiprocessing
@@ -20,6 +21,7 @@ T = TypeVar("T")
 MOST_BYTES = 1 << 30
 LEAST_SECONDS, BYTES_A_SECOND = 10.0, 1e5  # of processor time in which a child process reads a file
 STATM = Path("/proc/self/statm")
+END_WITH_PARENT = 1  # of prctl(2)
 
 
 def opened(path: Path, pipes: bool = False) -> BinaryIO:
@@ -62,11 +64,11 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 
 
 def in_own_process(
-    path: Path, function: Callable[[Path], T], seconds: float | None = None, memory: int | None = None
+    path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None
 ) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    The processor time of the child is at most `seconds`, by default proportional to the file size.
+    The child ends with this process, or after `seconds` of the processor, by default proportional to the file size.
 
     Raises:
         FetiHomogError: the function raises it.
@@ -82,10 +84,9 @@ def in_own_process(
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
-        most = {resource.RLIMIT_CPU: math.ceil(seconds)}
-        if memory is not None:
-            most[resource.RLIMIT_AS] = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
-        for kind, limit in most.items():
+        ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGKILL)
+        addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
+        for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
             limits = resource.getrlimit(kind)
             resource.setrlimit(kind, (min({limit, *limits} - {resource.RLIM_INFINITY}), limits[1]))
         try:
