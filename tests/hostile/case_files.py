@@ -64,16 +64,19 @@ FILES: dict[str, tuple[Content, str]] = {
 
 SPRINGS = "[path]\nstrain = [0.1, 0, 0]\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
 SPRINGS += "tangential_stiffness = {}\nlaw = "
+ENERGIES = "normal_toughness = 1e-3\ntangential_toughness = 1e-3\n"
 STRENGTHS = "normal_strength = 0.05\ntangential_strength = 0.05\n"
 LAWS = {
-    "energy of soft springs": ('"energy"\ntoughness = 1e-3\n', ("1e3", "1e-99"), "error: ", 3),
-    "soft springs": (f'"max"\n{STRENGTHS}', ("1e99", "1e-99"), "leaves a matrix singular", 3),
-    "damage of stiff springs": (
-        f'"bilinear"\n{STRENGTHS}normal_toughness = 1e-3\ntangential_toughness = 1e-3\n',
-        ("1e99", "1e99"),
-        "expected at most 1.25e+12",
-        2,
+    "energy of soft springs": ('"energy"\ntoughness = 1e-3\n', ("1e3", "1e-99"), "error: ", (3,)),
+    "soft springs": (f'"max"\n{STRENGTHS}', ("1e99", "1e-99"), "leaves a matrix singular", (3,)),
+    "damage of stiff springs": (f'"bilinear"\n{STRENGTHS}{ENERGIES}', ("1e99", "1e99"), "at most 1.25e+12", (2,)),
+    "a jump of the toughness": (
+        f'"bilinear"\n{STRENGTHS}{ENERGIES}mixing_exponent = 1e99\n',
+        ("1e3", "1e3"),
+        "mixing_exponent = 1e+99: expected a number at least 0.5 and at most 100",
+        (2,),
     ),
+    "endless friction": (f'"max"\n{STRENGTHS}friction = 1e99\n', ("1e3", "1e3"), "", (0, 3)),
 }
 """Laws at the edges of their ranges."""
 
@@ -94,11 +97,9 @@ def attempts() -> Iterator[Attempt]:
     for name, (content, expected) in FILES.items():
         kind = LONG_KIND if isinstance(content, str) and len(content) > 50_000 else "case files"
         yield Attempt(kind, name, ("check", "@/c.toml"), expected, {"c.toml": content})
-    for name, (law, stiffnesses, expected, code) in LAWS.items():
+    for name, (law, stiffnesses, expected, codes) in LAWS.items():
         case = changed(("0.05", "0.3"), PATH, end=SPRINGS.format(*stiffnesses) + law)
-        yield Attempt(
-            "laws", name, ("run", "@/c.toml", "--out", "@/out", "--quiet"), expected, {"c.toml": case}, (code,)
-        )
+        yield Attempt("laws", name, ("run", "@/c.toml", "--out", "@/out", "--quiet"), expected, {"c.toml": case}, codes)
     yield Attempt("case files", "of no name", ("check", "@/a\0b.toml"), "null character")
     yield Attempt("case files", "none", ("check", "@/\x1b[31m.toml"), r"\x1b[31m")
     yield Attempt("options", "of control characters", ("check", "@/c.toml", "--\x1b[31m"), r"\x1b[31m")

@@ -26,7 +26,7 @@ LIMITS: dict[str, tuple[str, str, tuple[int, ...]]] = {
     "little memory": (f"ulimit -v 800000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
     "very little memory": (f"ulimit -v 100000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
     "little memory of a rank": (
-        QUIET_MPI.format(f"-n 1 {RUN} : -n 1 bash -c 'ulimit -v 800000; {RUN}'"),
+        QUIET_MPI.format(f"-n 2 bash -c '[ $OMPI_COMM_WORLD_RANK = 0 ] || ulimit -v 800000; {RUN}'"),
         "rank 1: the memory (ulimit -v)",
         (1,),
     ),

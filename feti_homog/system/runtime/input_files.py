@@ -63,9 +63,7 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
     return kind(f"cannot read {path}: {is_open if 'file locking flag' in str(error) else error.strerror or error}")
 
 
-def in_own_process(
-    path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None
-) -> T:
+def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
     The child ends with this process, or after `seconds` of the processor, by default proportional to the file size.
@@ -74,7 +72,8 @@ def in_own_process(
         FetiHomogError: the function raises it.
         CaseError: the process crashes, or lacks memory or time.
     """
-    seconds = LEAST_SECONDS + path.stat().st_size / BYTES_A_SECOND if seconds is None else seconds
+    if seconds is None:
+        seconds = LEAST_SECONDS + (path.stat().st_size if path.exists() else 0) / BYTES_A_SECOND
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 

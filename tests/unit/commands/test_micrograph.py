@@ -92,7 +92,7 @@ BAND[70:] = 220
     [
         (BAND, "expected round fibres of 6 pixels in diameter or more"),  # all points of the contour lie on a line
         (BAND.T, "expected round fibres of 6 pixels in diameter or more"),
-        (np.full((20, 20), 7, np.uint8), "found one grey value"),
+        (np.full((20, 20), 7, np.uint8), "expected fibres brighter or darker"),
         (np.pad(np.full((40, 40), 200, np.uint8), 20), "expected round fibres of 6 pixels in diameter or more"),
     ],
 )
