@@ -38,7 +38,7 @@ FILES: dict[str, tuple[Content, str]] = {
     "a key of 1e6 parts": ("a." * 1_000_000 + "b = 1\n", "nested more than 50 deep"),
     "quoted parts of a key": ("['a' . " + '"" .' * 500_000 + "b]\n", "nested more than 50 deep"),
     "1e4 sections": (BASE + "".join(f"[x{k}]\n" for k in range(9_000)), "more faults"),
-    "1e6 angles": (BASE + f"[angle]\nvalues = [{'1, ' * 1_000_000}]\n", "entries; expected at most 100000"),
+    "3e5 angles": (BASE + f"[angle]\nvalues = [{'1, ' * 300_000}]\n", "entries; expected at most 100000"),
     "2000 angles": (BASE + f"[angle]\nvalues = {[k * 0.1 for k in range(2000)]}\n", "at most 1000 of them"),
     "3000 tests": (
         BASE + f"[unknown]\n{UNKNOWN}" + "[[test]]\nmeasured.E1 = {value = 1, std = 1}\n" * 3000,
@@ -55,11 +55,11 @@ FILES: dict[str, tuple[Content, str]] = {
     "1e5 interfaces": (BASE + "[[interface]]\nx = 1\n" * 100_000, "100000 sections; expected at most 1000"),
     "1e5 arcs": (BASE + f"[interface]\ndebonded = [{'{fibre = 1}, ' * 100_000}]\n", "at most 10000 of them"),
     "2e4 cases": (BASE + '[sweep]\n"cell.fibre_fraction" = [' + "'a', " * 20_000 + "]\n", "expected at most 10000"),
-    "2e5 unknown keys": (
-        BASE + "".join(f"[path.x{k}]\n" + "".join(f"y{n}=1\n" for n in range(100)) for k in range(2000)),
+    "1e5 unknown keys": (
+        BASE + "".join(f"[path.x{k}]\n" + "".join(f"y{n}=1\n" for n in range(100)) for k in range(1000)),
         "more faults",
     ),
-    "1e5 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[1, 0, 0], ' * 100_000}]\n"), "at most 10000"),
+    "5e4 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[1, 0, 0], ' * 50_000}]\n"), "at most 10000"),
 }
 
 SPRINGS = "[path]\nstrain = [0.1, 0, 0]\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
