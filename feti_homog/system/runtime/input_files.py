@@ -21,7 +21,6 @@ T = TypeVar("T")
 MOST_BYTES = 1 << 30
 LEAST_SECONDS, BYTES_A_SECOND = 10.0, 1e5  # of processor time in which a child process reads a file
 STATM = Path("/proc/self/statm")
-END_WITH_PARENT = 1  # of prctl(2)
 
 
 def opened(path: Path, pipes: bool = False) -> BinaryIO:
@@ -83,7 +82,7 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
-        ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGKILL)
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: it ends with its parent
         addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
         for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
             limits = resource.getrlimit(kind)
@@ -101,7 +100,7 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
     sender.close()
     try:
         # On a busy machine processor time takes longer; `poll` accepts 2e6 s at most.
-        answer = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
+        answer: T | FetiHomogError = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
     except EOFError:
         process.join()
         crash = CaseError(f"{path}: damaged, the library that reads it crashes")
@@ -111,5 +110,4 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
         process.join()
     if isinstance(answer, FetiHomogError):
         raise answer
-    result: T = answer
-    return result
+    return answer
