@@ -62,7 +62,9 @@ FILES: dict[str, tuple[Content, str]] = {
     "5e4 waypoints": (changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[1, 0, 0], ' * 50_000}]\n"), "at most 10000"),
 }
 
-SPRINGS = "[path]\nstrain = [0.1, 0, 0]\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
+SPRINGS = (
+    "[path]\nstrain = [0.1, 0, 0]\nmax_events = 4\n[output]\npictures = false\n[interface]\nnormal_stiffness = {}\n"
+)
 SPRINGS += "tangential_stiffness = {}\nlaw = "
 ENERGIES = "normal_toughness = 1e-3\ntangential_toughness = 1e-3\n"
 STRENGTHS = "normal_strength = 0.05\ntangential_strength = 0.05\n"

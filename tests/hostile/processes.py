@@ -95,12 +95,12 @@ FULL: dict[str, str] = {
 }
 ON_DISKS = {
     "a full disk, fit": (
-        DISK.format("size=120k") + "feti fit fit.toml --out out/disk/r --quiet",
+        DISK.format("size=40k") + "feti fit fit.toml --out out/disk/r --quiet",
         "No space left",
         (1, 3),
     ),
     "no more files, uncertainty": (
-        DISK.format("nr_inodes=8") + "feti uncertainty scatter.toml --out out/disk/r --quiet",
+        DISK.format("nr_inodes=4") + "feti uncertainty scatter.toml --out out/disk/r --quiet",
         "No space left",
         (1, 3),
     ),

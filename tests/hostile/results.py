@@ -269,8 +269,5 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
         yield Attempt("sweeps", name, COMMANDS["collect"], expected, files, (2,) if expected else (0,))
     for name, (out, files, expected) in OUTS.items():
         yield Attempt("folders", name, ("run", "@/c.toml", "--out", out), expected, {"c.toml": SMALL, **files})
-    files = {"c.toml": PREPARED["unfinished"][1]}
-    files["out"] = copy_of(prepared / "unfinished", events_log=replaced(os.mkfifo))
-    yield Attempt("folders", "a pipe for the log", ("run", "@/c.toml", "--out", "@/out", "--resume"), "", files, (3,))
     for command, words in COMMANDS.items():
         yield Attempt("no results", command, words, "")
