@@ -183,8 +183,8 @@ class InterfaceSection:
         only=(kinds.BREAKING, kinds.SOFTENING),
     )
     mixing_exponent: float = pair_key(
-        types.real(above=0.0),
-        "Exponent of Benzeggagh and Kenane's toughness, see tangential_toughness.",
+        types.real(least=0.5, most=100.0),
+        "Exponent of Benzeggagh and Kenane's toughness, see tangential_toughness; below 0.5 its slope has no bound.",
         default=2.0,
         only=(kinds.BREAKING, kinds.SOFTENING),
     )

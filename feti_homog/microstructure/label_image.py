@@ -62,9 +62,8 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     Raises:
         CaseError: the file is damaged or too large, or has not exactly one image.
     """
-    memory = 128 * types.MOST_PIXELS
-    image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), memory=memory)
-    if not is_grey and image.dtype.kind == "f" and np.array_equal(image, np.rint(image)):
+    image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), 128 * types.MOST_PIXELS)
+    if not is_grey and image.dtype.kind == "f" and np.all((image == np.rint(image)) & (np.abs(image) < 1 << 31)):
         image = image.astype(np.int64)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
         shape, way = "x".join(map(str, image.shape)), "; cut one layer out of a stack" * (image.ndim > 2)
@@ -86,16 +85,16 @@ def _decoded(path: Path, is_grey: bool) -> Array:
         with input_files.opened(path) as stream:
             if path.suffix.lower() in (".npy", ".npz"):
                 stored = np.load(stream, allow_pickle=False)
-                arrays = [stored] if isinstance(stored, np.ndarray) else [stored[name] for name in stored.files]
-                if len(arrays) != 1:
-                    raise CaseError(f"{path.name}: {len(arrays)} arrays; expected one")
-                return np.asarray(arrays[0])
+                entries = [...] if isinstance(stored, np.ndarray) else stored.files
+                if len(entries) != 1:
+                    raise CaseError(f"{path.name}: {len(entries)} arrays; expected one")
+                return np.asarray(stored[entries[0]])
             from PIL import Image, UnidentifiedImageError  # comes with Matplotlib
 
             simplefilter("ignore")
             Image.MAX_IMAGE_PIXELS = None  # the limit of this program holds
             try:
-                picture = Image.open(stream)
+                picture = Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP", "PPM"))  # others may start programs
             except UnidentifiedImageError:
                 raise CaseError(f"{path.name}: is no image, or damaged") from None
             _check_size(path, picture.height, picture.width)

@@ -236,7 +236,7 @@ def packed(event: Arrays) -> bytes:
 def unpacked(content: bytes) -> Arrays:
     """Decompress the content of a record into an event, up to a size that no event has.  Raises CaseError."""
     try:
-        data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 64 * len(content)))
+        data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 16 * len(content)))
         event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
         for name, kind, shape in json.loads(data[:start]):
             event[str(name)] = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape).copy()

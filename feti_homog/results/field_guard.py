@@ -35,7 +35,7 @@ def require_own(path: Path, state: int | None = None) -> None:
         has_events = (path.parent / "checkpoint/events").is_file()
         stored = " with --resume: the checkpoint has its events" if has_events else ""
         raise CaseError(f"cannot read {path}: it is missing; run the case again{stored}")
-    input_files.in_own_process(path, partial(require_tables, state=state), None, (1 << 30) + 4 * path.stat().st_size)
+    input_files.in_own_process(path, partial(require_tables, state=state), (1 << 30) + 4 * path.stat().st_size)
 
 
 def require_tables(path: Path, state: int | None) -> None:

@@ -64,7 +64,7 @@ def verify(directory: Path) -> Certificate:
     # Damaged numbers may ask for any memory and time: the limits are five times the need of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
     seconds = input_files.LEAST_SECONDS + size / input_files.BYTES_A_SECOND
-    return input_files.in_own_process(directory, _verified, seconds, (1 << 30) + 32 * size)
+    return input_files.in_own_process(directory, _verified, (1 << 30) + 32 * size, seconds)
 
 
 def _verified(directory: Path) -> Certificate:

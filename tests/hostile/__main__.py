@@ -11,7 +11,7 @@ from pathlib import Path
 
 from support.jobs import mpirun
 
-from hostile import case_files, events, fibre_tables, fuzzer, meshes, processes, results
+from hostile import case_files, events, fibre_tables, fuzzer, images, meshes, processes, results
 from hostile.attempts import Outcome
 from hostile.running import in_one_job, in_processes, make
 
@@ -49,7 +49,7 @@ def prepare(folder: Path) -> None:
 def tried(folder: Path, only: str, cases: int, seed: int) -> dict[str, Outcome]:
     """Return the outcomes of all attempts whose kind and name have these words, and of so many at random."""
     prepared = folder / "prepared"
-    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts()]
+    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts(), *images.attempts()]
     shared += [*results.attempts(prepared), *events.attempts(prepared)]
     shared, alone = (
         [a for a in some if only in f"{a.kind}: {a.name}"] for some in (shared, processes.attempts(prepared))

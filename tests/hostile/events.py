@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.results import checkpoints, result_json
 from hostile.attempts import Attempt, copy_of
-from hostile.results import COMMANDS, PREPARED
+from hostile.results import COMMANDS, PREPARED, replaced
 
 
 def in_events(change: Callable[[list[checkpoints.Arrays]], Any]) -> Callable[[Path], None]:
@@ -107,3 +107,6 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
             changes = {"checkpoint/events": make, "result_json": os.unlink}
             files = {"c.toml": PREPARED["unfinished"][1], "out": copy_of(prepared / "unfinished", **changes)}
             yield Attempt(FALSE_KIND, name, words, expected, files, codes)
+    files = {"c.toml": PREPARED["unfinished"][1]}
+    files["out"] = copy_of(prepared / "unfinished", events_log=replaced(os.mkfifo))
+    yield Attempt(FALSE_KIND, "a pipe for the log", resume, "max_events = 3", files, (3,))

@@ -8,6 +8,7 @@ import signal
 import sys
 from pathlib import Path
 
+from descendants import adopt, children
 from mpi4py import MPI
 
 from feti_homog import cli
@@ -42,8 +43,9 @@ def main(commands: Path, processor: float, clock: float) -> None:
 
     The end is the exit code, the seconds of the processor and the largest memory.
 
-    What other ranks print, whose errors are of their own, goes to K.2 too.
+    What other ranks print, whose errors are of their own, goes to K.2 too, and processes that a command has left.
     """
+    adopt()
     for number, words in enumerate(json.loads(commands.read_text())):
         for stream in (1, 2):
             end = os.open(f"{commands}.{number}.{stream}", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -56,6 +58,8 @@ def main(commands: Path, processor: float, clock: float) -> None:
         except SystemExit as end_of_help:
             code = int(str(end_of_help.code or 0))
         limit(0, 0)
+        if left := children():
+            print(f"left: processes {left}", file=sys.stderr)
         sys.stdout.flush()
         sys.stderr.flush()
         if MPI.COMM_WORLD.rank == 0:

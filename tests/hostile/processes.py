@@ -13,6 +13,9 @@ from hostile.results import SMALL
 # With four pictures.
 DRAWN = changed(("mesh_size = 0.05", "mesh_size = 0.3"), ('"stiffness"', '"load"'), end="[load]\nto = {E11 = 0.01}\n")
 BROKEN = changed(("fibre_fraction = 0.4", "fibre_fraction = 1.4"))
+UNKNOWN = "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 400.0}\n"
+UNKNOWN += "[measured]\nE1 = {value = 130.0, std = 1.0}\n"
+SCATTERED = "young = 200.0", "young = {mean = 200.0, cv = 0.05}"
 BIG = changed(("mesh_size = 0.05", "mesh_size = 0.003"), end="[output]\npictures = false\n")
 NOBODY = "setpriv --reuid=65534 --regid=65534 --clear-groups"
 RUN, IN_OUT = "feti run c.toml --out out", "feti run ../c.toml --out ."
@@ -91,6 +94,16 @@ FULL: dict[str, str] = {
     "export": "feti export out --format abaqus",
 }
 ON_DISKS = {
+    "a full disk, fit": (
+        DISK.format("size=40k") + "feti fit fit.toml --out out/disk/r --quiet",
+        "No space left",
+        (1, 3),
+    ),
+    "no more files, uncertainty": (
+        DISK.format("nr_inodes=4") + "feti uncertainty scatter.toml --out out/disk/r --quiet",
+        "No space left",
+        (1, 3),
+    ),
     "a full disk, run": (DISK.format("size=200k") + "feti run drawn.toml --out out/disk/r", "No space left", (1,)),
     "no more files, run": (DISK.format("nr_inodes=4") + "feti run drawn.toml --out out/disk/r", "No space left", (1,)),
     "read only": (DISK.format("ro") + "feti run c.toml --out out/disk/r", "out/disk", (1, 2)),
@@ -122,7 +135,8 @@ OTHERS = {
 def attempts(prepared: Path) -> Iterator[Attempt]:
     """Yield those that need a process of their own; some need root."""
     files: dict[str, Content] = {"c.toml": SMALL, "drawn.toml": DRAWN, "big.toml": BIG, "broken.toml": BROKEN}
-    made = {**files, "out": copy_of(prepared / "card")}
+    of_studies: dict[str, Content] = {"fit.toml": SMALL + UNKNOWN, "scatter.toml": SMALL.replace(*SCATTERED)}
+    made = {**files, **of_studies, "out": copy_of(prepared / "card")}
     for kind, table in (("limits", LIMITS), ("surroundings", SURROUNDINGS)):
         for name, (shell, expected, codes) in table.items():
             yield Attempt(kind, name, (), expected, files | {"out/x": ""}, codes, shell)

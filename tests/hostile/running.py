@@ -14,6 +14,7 @@ from support.jobs import ROOT, environment, mpirun
 
 from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, Outcome, entries
 
+DESCENDANTS = Path(__file__).with_name("descendants.py")
 MOST_TOLD = 1500  # characters of what a faulty attempt printed
 
 
@@ -31,8 +32,9 @@ def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[st
     before = [entries(place) for place in places]
     commands = folder / "commands"
     commands.write_text(json.dumps([a.command(place) for a, place in zip(attempts, places, strict=True)]))
-    limits = str(LIMIT_S), str(PATIENCE_S)
-    job = mpirun(ranks, Path(__file__).with_name("job.py"), commands, *limits, cwd=here)
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable]
+    words = Path(__file__).with_name("job.py"), commands, str(LIMIT_S), str(PATIENCE_S)
+    job = mpirun(0, DESCENDANTS, *launcher, *words, cwd=here)
     found = {}
     for number, (attempt, place) in enumerate(zip(attempts, places, strict=True)):
         answers = [Path(f"{commands}.{number}.{end}") for end in ("code", "1", "2")]
@@ -48,6 +50,8 @@ def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[st
         if not code:
             faults.append(f"the job ended: {job.stderr[-300:]}")
             break
+    if "left: " in job.stderr:
+        found[f"left: after the job, {ranks} ranks"] = Outcome([job.stderr[-MOST_TOLD:]])
     return found
 
 
@@ -73,9 +77,15 @@ def _in_process(attempt: Attempt, place: Path) -> list[str]:
     own = {"PATH": path, "PYTHONPATH": str(ROOT), "HOME": home, "MPLCONFIGDIR": home}
     mounts = ["unshare", "--mount"] if attempt.kind == "disks" else []
     shell = f"ulimit -t {LIMIT_S}; {attempt.shell}"
-    words = ["timeout", "--signal=KILL", str(PATIENCE_S), *mounts, "bash", "-c", shell]
+    words = [sys.executable, "-IS", str(DESCENDANTS), "timeout", "--signal=KILL", str(PATIENCE_S), *mounts]
     job = subprocess.run(
-        words, cwd=place, env=environment() | own, capture_output=True, text=True, errors="replace", check=False
+        [*words, "bash", "-c", shell],
+        cwd=place,
+        env=environment() | own,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
     )
     faults = attempt.faults(job.returncode, job.stdout, job.stderr, entries(place) - before)
     return [*faults, f"{job.stdout[-300:]}{job.stderr[-MOST_TOLD:]}"] if faults else []

@@ -51,6 +51,8 @@ OPTIONS: dict[str, tuple[str, str]] = {
         "-feti_schur_mat_mumps_icntl_14 2000000000",
         "-feti_schur_mat_mumps_icntl_14 2000000000: expected an integer of at least 0 and at most 10000",
     ),
+    "log of letters": ("-log_all abc", "-log_all abc: expected true or false"),
+    "dump of letters": ("-malloc_dump abc", "-malloc_dump abc: expected true or false"),
     "switch with a word": ("-malloc_debug maybe", "-malloc_debug maybe: expected true or false"),
 }
 """Words after `check CASE.toml`."""

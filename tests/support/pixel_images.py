@@ -1,7 +1,12 @@
 """Images of square pixels as meshes of gmsh, two triangles or a quadrilateral a pixel: bodies touch at corners."""
 
+from pathlib import Path
+
 import numpy as np
+from PIL import Image
 from unit.mesh.faulty_meshes import Elements, MshFile
+
+from feti_homog import Case
 
 # The symmetries of the square: their matrices.
 SYMMETRIES = [
@@ -78,3 +83,24 @@ def turned(symmetry: np.ndarray, of_strain: bool = False) -> np.ndarray:
     return np.array(
         [[a * a, b * b, two * a * b], [c * c, d * d, two * c * d], [half * a * c, half * b * d, a * d + b * c]]
     )
+
+
+MATERIALS = {
+    "matrix": {"young": 3.0, "poisson": 0.35},
+    "fibre": {"young": 70.0, "poisson": 0.2},
+    "fibre:2": {"young": 7.0, "poisson": 0.3},
+}
+
+
+def case(path: Path, image: np.ndarray | None, phases: tuple[str, ...] = ("matrix", "fibre"), **cell: object) -> Case:
+    """Return the case of an image, whose rows count from below."""
+    if image is not None:
+        upper = np.asarray(image)[::-1]
+        np.save(path, upper) if path.suffix == ".npy" else Image.fromarray(upper.astype(np.uint8)).save(path)
+    labels = {str(k): name for k, name in enumerate(phases)}
+    document = {
+        "cell": {"geometry": "pixels", "file": str(path), "labels": labels} | cell,
+        "material": {name: MATERIALS[name] for name in phases if name in MATERIALS},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    return Case.parse(document)

@@ -16,7 +16,8 @@ OptionRule = tuple[str, Callable[[str], bool]]
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
 FLAGS = (
-    *("feti_view", "malloc_debug", "malloc_test", "malloc_requested_size", "log_view_memory", "log_view_gpu_time"),
+    *("feti_view", "malloc", "malloc_debug", "malloc_dump", "malloc_test", "malloc_requested_size", "checkstack"),
+    *("log_all", "log_sync", "log_view_memory", "log_view_gpu_time", "get_total_flops", "options_monitor_cancel"),
     *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
 )
 CASE_FILE = ".toml"
@@ -148,7 +149,7 @@ RULES: dict[str, OptionRule] = {
     "feti_ksp_error_if_not_converged": ("false: a run reports such solves, and keeps its results", _is_false),
     "fp_trap": ("false: the program checks where numbers may not be finite", _is_false),
     **dict.fromkeys(
-        ("info", "malloc_dump", "malloc_view"),  # up to its first colon the text is a switch or a file
+        ("info", "malloc_view"),  # up to its first colon the text is a switch or a file
         (NEW_FILE, lambda text: _is_switch(file := text.partition(":")[0]) or can_be_written(file)),
     ),
     "options_file": ("a file with one option of PETSc a line, without options_file", lambda text: False),

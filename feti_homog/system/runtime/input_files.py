@@ -3,6 +3,7 @@
 A library that may crash on a damaged file reads the file in a separate process.
 """
 
+import ctypes
 import errno
 import math
 import multiprocessing
@@ -61,18 +62,17 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
     return kind(f"cannot read {path}: {is_open if 'file locking flag' in str(error) else error.strerror or error}")
 
 
-def in_own_process(
-    path: Path, function: Callable[[Path], T], seconds: float | None = None, memory: int | None = None
-) -> T:
+def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    The processor time of the child is at most `seconds`, by default proportional to the file size.
+    The child ends with this process, or after `seconds` of the processor, by default proportional to the file size.
 
     Raises:
         FetiHomogError: the function raises it.
         CaseError: the process crashes, or lacks memory or time.
     """
-    seconds = LEAST_SECONDS + path.stat().st_size / BYTES_A_SECOND if seconds is None else seconds
+    if seconds is None:
+        seconds = LEAST_SECONDS + (path.stat().st_size if path.exists() else 0) / BYTES_A_SECOND
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
 
@@ -82,10 +82,9 @@ def in_own_process(
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
-        most = {resource.RLIMIT_CPU: math.ceil(seconds)}
-        if memory is not None:
-            most[resource.RLIMIT_AS] = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
-        for kind, limit in most.items():
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: it ends with its parent
+        addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
+        for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
             limits = resource.getrlimit(kind)
             resource.setrlimit(kind, (min({limit, *limits} - {resource.RLIM_INFINITY}), limits[1]))
         try:
@@ -101,7 +100,7 @@ def in_own_process(
     sender.close()
     try:
         # On a busy machine processor time takes longer; `poll` accepts 2e6 s at most.
-        answer = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
+        answer: T | FetiHomogError = receiver.recv() if receiver.poll(min(30.0 * seconds, 1e6)) else late
     except EOFError:
         process.join()
         crash = CaseError(f"{path}: damaged, the library that reads it crashes")
@@ -111,5 +110,4 @@ def in_own_process(
         process.join()
     if isinstance(answer, FetiHomogError):
         raise answer
-    result: T = answer
-    return result
+    return answer

@@ -122,7 +122,7 @@ SPECKS = np.where(np.hypot(AWAY[None], AWAY[:, None]) < 2.8, 200, 50).astype(np.
         (BAND, "expected round fibres of 6 pixels in diameter or more"),  # all points of the contour lie on a line
         (BAND.T, "expected round fibres of 6 pixels in diameter or more"),
         (SPECKS, "expected round fibres of 6 pixels in diameter or more"),
-        (np.full((20, 20), 7, np.uint8), "found one grey value"),
+        (np.full((20, 20), 7, np.uint8), "expected fibres brighter or darker"),
         (np.pad(np.full((40, 40), 200, np.uint8), 20), "expected round fibres of 6 pixels in diameter or more"),
     ],
 )

@@ -16,10 +16,8 @@ from feti_homog.results.checkpoints import (
     PREFIX,
     Checkpoint,
     EventsInMemory,
-    packed,
     records,
     refuse_others,
-    unpacked,
 )
 
 EVENTS = 4
@@ -119,15 +117,6 @@ def test_events_survive_a_power_failure_unless_cheap(tmp_path, monkeypatch):
         before = len(synced)
         write(checkpoint, number, light)
         assert (len(synced) > before) is not light
-
-
-def test_an_event_that_grows_beyond_all_events_is_refused(monkeypatch):
-    """As of a compressed file of zeros."""
-    content = packed({"lam": np.zeros(10**6)})
-    assert unpacked(content)["lam"].shape == (10**6,)
-    monkeypatch.setattr(checkpoints, "WHOLE_BYTES", 1000)
-    with pytest.raises(CaseError, match="an event of the checkpoint is damaged"):
-        unpacked(content)
 
 
 def test_other_files_are_refused(tmp_path):

@@ -1,7 +1,6 @@
 """Results of the program are verified; a copy with one false value breaks the laws that it must break."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from support.falsifications import (
 from support.verified_results import CASES, CONDUCTION, LOADS, MIXED_PATHS, falsified
 
 from feti_homog.verify.certificate import verify
-from feti_homog.verify.check_constants import check_conductivity
 from feti_homog.verify.check_state import check_gluing
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, checks
@@ -207,30 +205,6 @@ FALSE = {
     "a bound": ("bonded", document("bounds", "hashin_shtrikman", "shear", 1), {"bounds"}),
     "a fraction": ("bonded", document("cell", "fractions", "fibre"), {"cell"}),
     "an area": ("bonded", document("cell", "area"), {"cell"}),
-    "a conductivity": ("conductivity", document("effective_conductivity", 2, 2), {"tables"}),
-    "a coupling of conductivities": (
-        "conductance", document("effective_conductivity", 0, 1, factor=1.01), {"tables", "symmetry"},
-    ),
-    "a conductivity of a phase": (
-        "conductivity", document("case", "material", "fibre", "conductivity", "axial"),
-        {"stress", "mean stress", "bounds"},
-    ),
-    "a tensor of a phase": (
-        "conductance", document("case", "material", "fibre", "conductivity", 0, 0),
-        {"stress", "equilibrium", "mean stress"},
-    ),
-    "a conductance": ("conductance", document("case", "interface", "conductance", factor=1.01), {"bond"}),
-    "a bound of conductivities": (
-        "conductivity", document("conductivity_estimates", "hashin_shtrikman", 1), {"bounds"},
-    ),
-    "Wiener's bound": ("conductivity", document("conductivity_estimates", "wiener", 0), {"bounds"}),
-    "a conductivity beyond its bounds": (
-        "conductivity", document("effective_conductivity", 0, 0, factor=10.0), {"bounds", "tables"},
-    ),
-    "a mean of conductivities": ("conductivity", document("conductivity_estimates", "axial"), {"bounds"}),
-    "a temperature": (
-        "conductivity", shift("axial_displacement"), {"stress", "periodicity", "jump", "equilibrium", "mean stress"},
-    ),
     "a number of elements": ("bonded", document("cell", "elements", to=1), {"cell"}),
 }  # fmt: skip
 
@@ -239,21 +213,6 @@ FALSE = {
 def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
     kind, edit, laws = FALSE[name]
     assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
-
-
-@pytest.mark.parametrize("bonds", [{}, {"conductance": 3.0}], ids=str)
-@pytest.mark.parametrize("with_bounds", [True, False])
-def test_bounds_of_conductivities_are_those_of_bonds_without_resistance(bonds, with_bounds):
-    """Two halves that conduct 1 and 3 across the fibres, 2 and 4 along; k^ef is Hashin and Shtrikman's lower bound."""
-    k, A = np.diag([5 / 3, 5 / 3, 3.0]), np.zeros((2, 6, 6))
-    A[:, [2, 3, 4], [2, 3, 4]] = [[2.0, 1.0, 1.0], [4.0, 3.0, 3.0]]
-    bounds = {"wiener": [1.5, 2.0], "hashin_shtrikman": [5 / 3, 1.8]} if with_bounds else {}
-    forms = {"axial": 3.0, "wiener": None, "hashin_shtrikman": None} | bounds
-    document = {"effective_conductivity": k, "conductivity_estimates": forms}
-    files = SimpleNamespace(document=document, interfaces=[bonds])
-    found = Findings(checks(1e-9, False, False))
-    check_conductivity(found, SimpleNamespace(files=files, fractions=np.array([0.5, 0.5]), stiffnesses=A))
-    assert [one.name for one in found.worst() if not one.holds] == ["bounds"] * (bool(bonds) is with_bounds)
 
 
 def test_an_element_without_area_is_noticed(results, tmp_path):

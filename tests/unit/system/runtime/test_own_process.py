@@ -2,12 +2,16 @@
 
 import os
 import resource
+import select
 import signal
 
 import pytest
+from support.jobs import PATIENCE
 
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime.input_files import in_own_process
+
+MEMORY = 1 << 28
 
 
 def crash(_):
@@ -23,7 +27,7 @@ def ask_for_too_much(_):
 
 
 def test_an_answer_comes_back(tmp_path):
-    assert in_own_process(tmp_path, os.listdir) == []
+    assert in_own_process(tmp_path, os.listdir, MEMORY) == []
 
 
 @pytest.mark.parametrize(
@@ -31,7 +35,7 @@ def test_an_answer_comes_back(tmp_path):
 )
 def test_what_goes_wrong_is_reported(tmp_path, function, words):
     with pytest.raises(CaseError, match=f"^{tmp_path}: .*{words}$"):
-        in_own_process(tmp_path, function)
+        in_own_process(tmp_path, function, MEMORY)
 
 
 def wait(_):
@@ -48,9 +52,26 @@ def test_what_does_not_end_is_ended(tmp_path, function, seconds):
     """A pipe ends when no process can write to it any more."""
     ours, theirs = os.pipe()
     with pytest.raises(CaseError, match=f"damaged, reading does not end within {seconds:g} s"):
-        in_own_process(tmp_path, function, seconds)
+        in_own_process(tmp_path, function, MEMORY, seconds)
     os.close(theirs)
     assert os.read(ours, 1) == b""
+    os.close(ours)
+
+
+def test_a_child_ends_with_its_parent(tmp_path):
+    """The parent is killed while the child waits; the pipe ends with the last process that has it open."""
+    ours, theirs = os.pipe()
+
+    def end_the_parent(_):
+        os.kill(os.getppid(), signal.SIGKILL)
+        signal.pause()
+
+    parent = os.fork()
+    if parent == 0:
+        in_own_process(tmp_path, end_the_parent, MEMORY)
+    os.close(theirs)
+    assert os.waitstatus_to_exitcode(os.waitpid(parent, 0)[1]) == -signal.SIGKILL
+    assert select.select([ours], [], [], PATIENCE)[0] and os.read(ours, 1) == b""
     os.close(ours)
 
 
@@ -58,12 +79,12 @@ def test_the_limit_follows_from_the_size_of_the_file(tmp_path):
     """A sparse file of 5 MB has 10 s of the processor, and 1 s more for each 0.1 MB."""
     (tmp_path / "large").touch()
     os.truncate(tmp_path / "large", 5_000_000)
-    assert in_own_process(tmp_path / "large", lambda _: resource.getrlimit(resource.RLIMIT_CPU)[0]) == 60
+    assert in_own_process(tmp_path / "large", lambda _: resource.getrlimit(resource.RLIMIT_CPU)[0], MEMORY) == 60
     os.truncate(tmp_path / "large", 1 << 40)
-    assert in_own_process(tmp_path / "large", lambda _: 0) == 0  # a clock of years
+    assert in_own_process(tmp_path / "large", lambda _: 0, MEMORY) == 0  # a clock of years
 
 
 def test_more_memory_than_allowed_is_refused(tmp_path):
-    assert in_own_process(tmp_path, lambda _: len(bytes(1 << 20)), memory=1 << 28) == 1 << 20
+    assert in_own_process(tmp_path, lambda _: len(bytes(1 << 20)), MEMORY) == 1 << 20
     with pytest.raises(CaseError, match="damaged, "):
-        in_own_process(tmp_path, lambda _: len(bytes(1 << 30)), memory=1 << 28)
+        in_own_process(tmp_path, lambda _: len(bytes(1 << 30)), MEMORY)
