@@ -195,7 +195,7 @@ class Sensitivities:
         "of a load: the strains and stresses that it does not prescribe, and `stored`"
     )
     constant_values: Float = described("their values, each in its unit", "", "(n,)")
-    derivatives: Float = described("derivative of each constant by each parameter", "", "(n, p)")
+    derivatives: Float = described("derivative of each constant with respect to each parameter", "", "(n, p)")
     at_fixed_status: bool = described(
         "whether faces touch without tension: derivatives hold as long as no node opens or closes", default=False
     )

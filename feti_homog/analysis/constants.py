@@ -202,7 +202,7 @@ def _note_bounds(
 def note_outside(
     context: AnalysisContext, limits: Mapping[str, Sequence[float]], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note each value outside its limits; record a fault beyond any mesh error, as `_note_bounds`.
+    """Note each value outside its limits; if no mesh error explains it, record a fault, as `_note_bounds` does.
 
     The limits bound effective constants; constants of a cell that is not periodic may lie outside.
     """

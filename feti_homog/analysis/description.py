@@ -19,7 +19,7 @@ from feti_homog.system.petsc import options_database
 def describe(case: Case, comm: MPI.Intracomm) -> str:
     """Describe a run of the case on these ranks, under its own options; empty except on rank 0.  Collective.
 
-    Raises as `tear`.
+    Raises like `tear`.
     """
     with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -92,7 +92,7 @@ def _cost_lines(
     breaks = case.section.is_followed and case.interfaces and end > memory
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""
     few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
-    yield f"estimate   on {ranks} {noun} about {few} on the largest{all_bonds}, without pictures"
+    yield f"estimate   on {ranks} {noun} at most about {few} per rank{all_bonds}, without pictures"
     most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one per body")
     recommended = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
     reason = f"{partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit}"

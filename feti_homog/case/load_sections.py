@@ -1,6 +1,6 @@
 """Define loads by name, and the analysis sections [angle], [path], [load] and [envelope].
 
-A load gives the strain or the stress of each component; on a path, the former load provides missing components.
+A load gives the strain or the stress of each component; on a path, the previous load provides missing components.
 """
 
 import dataclasses

@@ -22,7 +22,7 @@ _C = np.array([0.445948490915965, 0.091576213509771])
 _P2_POINTS = np.stack([np.r_[1 - 2 * _C, _C, _C], np.r_[_C, 1 - 2 * _C, _C]], axis=1)
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 BUBBLE = 6
-# Second derivatives (6, 3) of the shape functions by the reference coordinates: 11, 22 and 12.
+# Second derivatives (6, 3) of the shape functions with respect to the reference coordinates: 11, 22 and 12.
 HESSIANS = np.array([[4, 4, 4], [4, 0, 0], [0, 4, 0], [-8, 0, -4], [0, 0, 4], [0, -8, -4]], float)
 # INTEGRAL = int b and int db/dr_r db/dr_s = GRADIENTS T_rs on the unit triangle; with Pi, PROJECTED times the latter.
 INTEGRAL, GRADIENTS, PROJECTED = 9 / 40, 81 / 40, 3 / 5

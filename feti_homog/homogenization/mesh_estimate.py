@@ -196,7 +196,7 @@ def _recovered(
 class Group(NamedTuple):
     """The recovered stresses and arc sides of a subdomain group.
 
-    `place` (classes,) has the positions of displacements on all boundaries or, across materials, in all parts, or NONE.
+    `place` (classes,): position among the displacements on all boundaries (across materials, in all parts), or NONE.
     """
 
     stress: stress_recovery.RecoveredStress

@@ -102,8 +102,8 @@ BY_COST = PartitionPolicy(across_dofs=400_000)
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials.
 
-    They may if nothing can part and the case does not prescribe the cut.  Jumps at nearly incompressible phases and
-    between very different stiffnesses need the scaling of single bodies, which dual solver options assume, too.
+    They may if nothing can part and the case prescribes neither the cut nor the dual solver.  Nearly incompressible
+    phases and very different stiffnesses need the scaling of single bodies, so they rule such subdomains out, too.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:

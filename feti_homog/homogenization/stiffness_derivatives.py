@@ -34,7 +34,7 @@ IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 @dataclass(frozen=True)
 class Derivative:
-    """The derivatives of the stresses under unit loads by one constant.
+    """The derivatives of the stresses under unit loads with respect to one constant.
 
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
@@ -48,7 +48,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate the stiffness by all constants, from the responses to unit loads.  Collective."""
+    """Differentiate the stiffness with respect to all constants, from the responses to unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads

@@ -220,7 +220,7 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
     """Return the interface numbers, nesting and edge counts of a tiled cell.
 
     Returns:
-        Interface numbers (phases, phases) as from `cell_remarks.pairs_of`; nesting (constituents,) as `Torus.nesting`;
+        Interface numbers (phases, phases), see `cell_remarks.pairs_of`; nesting (constituents,) as `Torus.nesting`;
         and the number (constituents,) of coarse edges between each constituent and others.
 
     Raises:

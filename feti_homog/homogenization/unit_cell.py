@@ -243,7 +243,7 @@ def assemble_subdomains(
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
 
-    Returns the part of the cell on this rank, its shared entities, the lattice and the subdomains.  Raises as `tear`.
+    Returns the part of the cell on this rank, its shared entities, the lattice and the subdomains.  Raises like `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:

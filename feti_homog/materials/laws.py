@@ -39,7 +39,7 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 def stiffness_of(material: material_forms.Material, plane: str) -> Float:
     """Return the stiffness (3, 3) in the plane, (6, 6) if the plane state is spatial, or `conductivity`.
 
-    Raises as `plane_stiffness`.
+    Raises like `plane_stiffness`.
     """
     if voigt.PLANE_STATES[plane].is_scalar:
         return conductivity(material)

@@ -29,7 +29,7 @@ TURN *= np.pi / 180
 
 @dataclass(frozen=True)
 class LawChange:
-    """The derivatives of a phase law by one constant.
+    """The derivatives of a phase law with respect to one constant.
 
     Attributes:
         name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by each given constant; in space, expansions come last."""
+    """Yield the derivatives with respect to each given constant; in space, expansions come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -71,7 +71,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield the derivatives by engineering constants: dC = -C dS C with the plane state's compliance S."""
+    """Yield the derivatives with respect to engineering constants: dC = -C dS C with the plane state's compliance S."""
     skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -89,7 +89,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield the derivatives by the entries of a stiffness, on both sides of the diagonal."""
+    """Yield the derivatives with respect to the entries of a stiffness, on both sides of the diagonal."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:

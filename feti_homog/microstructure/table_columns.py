@@ -126,7 +126,7 @@ class SourceColumn:
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Convert a cell to a number; return any other cell unchanged."""
+        """Convert a numeric table entry; return any other entry, or a phase, unchanged."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 

@@ -70,7 +70,7 @@ def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> li
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield, for each later leg: number, component whose strain changes most, point of its largest stress."""
+    """Yield, from the second leg on: number, component whose strain changes most, point of this component's peak."""
     leg, changed = legs_of(document), changed_components(document)
     strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
     for number in range(2, legs(document) + 1):

@@ -47,7 +47,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises as `write`."""
+    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:

@@ -101,7 +101,7 @@ def document_lock(directory: Path) -> Iterator[None]:
             lock.path.unlink(missing_ok=True)
         yield
     except file_locks.LockHeld as error:
-        raise CaseError(f"--out {directory}: {error} has been writing the document of a study for long") from error
+        raise CaseError(f"--out {directory}: {error} still writes the document of a study") from error
     finally:
         lock.release()
 
@@ -225,7 +225,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a failed or damaged case to WAITING, without its error and events.  On one rank.  Raises as `set_aside`."""
+    """Reset a failed or damaged case to WAITING, without error and events.  On one rank.  Raises like `set_aside`."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)

@@ -257,7 +257,7 @@ def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
 
 
 def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
-    """Return a heading and the description of the first case.  Collective.  Raises as `describe`."""
+    """Return a heading and the description of the first case.  Collective.  Raises like `describe`."""
     check_options(sweep)
     text = description.describe(sweep.cases[0], comm)
     return f"{heading}\n{text}" if comm.rank == 0 else ""

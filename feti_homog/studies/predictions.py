@@ -136,7 +136,7 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return the exact derivatives (m,) of the computed values by an unknown, or None.
+    """Return the exact derivatives (m,) of the computed values with respect to an unknown, or None.
 
     Elastic constants do not depend on strengths, nor on expansions in a plane.  With a single interface the loads at
     breaks are homogeneous: of degree 1 in its only strength, of degree 1/2 in the toughness of springs that do not

@@ -86,7 +86,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     # The rounding error of an eigenvalue is at most the matrix order times the norm, which the order bounds.
     if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
         place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
-        faults.append(f"{place}: no constants are so correlated; expected a positive matrix")
+        faults.append(f"{place}: these correlations are impossible; expected a positive semidefinite matrix")
     return result
 
 

@@ -171,9 +171,9 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
-    """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, else 0.
+    """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    If the slip is C_0 t + g (C_0 intact) under the shear traction t, the damaged fraction bears t - g / (C - C_0).
+    With shear compliances C_0 (intact) and C (damaged), and the slip C_0 t + g, the fraction bears t - g / (C - C_0).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

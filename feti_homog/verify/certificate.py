@@ -1,4 +1,4 @@
-"""The certificate: all laws on the files of a result folder, in a separate process, as text and as JSON."""
+"""The certificate, as text and as JSON: all laws, checked on the files of a result folder in a separate process."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class Certificate:
 
 
 def verify(directory: Path) -> Certificate:
-    """Check all laws on a result folder; raise CaseError, one line, if a file is unreadable."""
+    """Check a result folder against all laws; raise a one-line CaseError if a file is unreadable."""
     # Damaged numbers may ask for any memory and time: the limits are five times the need of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
     seconds = input_files.LEAST_SECONDS + size / input_files.BYTES_A_SECOND

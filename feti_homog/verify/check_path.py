@@ -132,7 +132,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json by superposed states of the unit loads.
+    """Check the points of `envelope` in result.json by superposing the states under the unit loads.
 
     Debonded nodes, and tips that break by energy release, have no utilisation.
     """

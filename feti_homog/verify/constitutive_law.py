@@ -56,7 +56,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
 
     Elements of isotropic phases are mixed, except in plane stress and conduction.  In an isotropic phase one modulus
-    and one ratio give all constants, up to rounding.  Raises as `laws`.
+    and one ratio give all constants, up to rounding.  Raises like `laws`.
     """
     mixed = []
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -82,7 +82,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     """Compute matrices (phases, 2, 3) from [S11, S22, S12] to [S33, E33].
 
     E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33 and E33 is 0.
-    The matrix is NaN if the constants do not determine S33 or E33.  Raises as `laws`.
+    The matrix is NaN if the constants do not determine S33 or E33.  Raises like `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],

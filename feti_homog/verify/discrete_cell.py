@@ -35,7 +35,7 @@ class Faces:
         row: (b,) interface node of a torn node, or -1.
         is_fibre: (b,) whether a torn node belongs to the inner body.
         copies: (b,) number of periodic images of a torn node in its subdomain.
-        distance, place: (k,) place of an interface node, and distance from the node; -1 and inf without a place.
+        place, distance: (k,) place of an interface node, and its distance from the node; -1 and inf without a place.
         pair: (places,) section of the two bodies, if exactly two bodies meet along one line; else -1.
     """
 

@@ -1,4 +1,4 @@
-"""Lattices that are no rectangle, as rectangular cells of several fibres."""
+"""Lattices that are not rectangular, as rectangular cells of several fibres."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def stiffness(tmp_path, cell):
 
 
 def lattice(w, s, h, q, radius):
-    """Return the cell of q fibres that `Lattices that are no rectangle` of meshes/README.md describes."""
+    """Return the cell of q fibres that `Lattices that are not rectangular` of meshes/README.md describes."""
     centres = [(k * s % w, k * h) for k in range(q)]
     fibres = ", ".join(f"{{x = {x}, y = {y}, radius = {radius}}}" for x, y in centres)
     return f'geometry = "table"\nwidth = {w}\nheight = {q * h}\nfibre_list = [{fibres}]\n'

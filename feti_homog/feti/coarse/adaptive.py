@@ -86,7 +86,7 @@ class AdaptiveCoarseSpace:
     def activate(self, active: Float) -> None:
         """Average the modes over node copies on active rows, and factor again.  Collective.
 
-        Rows are active where `active` (owned rows,) is 1; the scaling has the same active rows.  Raises as `factor`.
+        Rows are active where `active` (owned rows,) is 1; the scaling has the same active rows.  Raises like `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask

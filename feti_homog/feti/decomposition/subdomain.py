@@ -125,7 +125,7 @@ class Subdomain:
             mixed=mixed, **flags,
         )  # fmt: skip
         if submesh.boundary == "traction" and submesh.index == 0:
-            # Sides that move freely do not hold the cell: springs do, in which tractions in equilibrium cause no force.
+            # Springs hold a cell whose sides move freely; tractions in equilibrium cause no force in these springs.
             subdomain._support = subdomain._springs(K, np.arange(mesh.n_classes))
             subdomain._built_stiffness, subdomain.R = (K + subdomain._support).tocsr(), R[:, :0]
         return subdomain

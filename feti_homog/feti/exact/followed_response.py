@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `values` as from `_present`."""
+        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `_present` returns `values`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B

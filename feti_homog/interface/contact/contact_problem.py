@@ -165,7 +165,7 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find the statuses and the solution under a load, from guessed `bonds`.  Collective; raises as `linear`."""
+        """Find the statuses and the solution under a load, from guessed `bonds`.  Collective; raises like `linear`."""
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:
@@ -176,7 +176,7 @@ class ContactProblem:
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises as `linear`."""
+        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `linear`."""
         comm, fewest, pivots = self.solver.comm, np.inf, 0
         iterations = solves = 0
         while True:

@@ -142,7 +142,7 @@ class FloatingBodies:
             (1 - w) before + w after + M a >= 0,   and with   >= -2 noise:
 
         where faces begin to squeeze the first fibre, and where the squeezing is beyond doubt.  Collective, decided on
-        rank 0; raises as `place`.
+        rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 

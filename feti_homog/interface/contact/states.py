@@ -83,7 +83,7 @@ class Equilibrium:
         solution: last dual solution.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists.
-        certificate: errors as from `kkt_errors`.
+        certificate: errors, as returned by `kkt_errors`.
         asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes for
             all loads up to this load.
         axial: equilibrium along the fibres with these bonds, in generalized plane strain.

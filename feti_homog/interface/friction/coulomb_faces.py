@@ -41,7 +41,7 @@ INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
 class StuckError(NotCarriedError):
-    """No admissible statuses of the debonded faces continue a state."""
+    """A state has no continuation: no statuses of the debonded faces are admissible."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to a guess; None for too many sets of statuses."""
+        """Return the admissible statuses closest to a guess, and x; None without any, or with too many candidates."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:

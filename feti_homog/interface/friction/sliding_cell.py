@@ -147,7 +147,7 @@ class SlidingCell:
     """
 
     def __init__(self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float) -> None:
-        """Compute the response of the bonded cell to unit loads.  Collective; raises as `CondensedProblem`."""
+        """Compute the response of the bonded cell to unit loads.  Collective; raises like `CondensedProblem`."""
         self.cell, self.interface, self.solver = cell, cell.plane, cell.plane.solver
         self.friction, self.friction_of_damage = friction, friction_of_damage
         self._plane, *self._axial = (CondensedProblem(problem) for problem in cell.problems)

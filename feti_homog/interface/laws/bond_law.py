@@ -122,9 +122,9 @@ class BondLaw(ABC):
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the fracture energies (p,) of bonds under tractions (k, c).
+        """Return the fracture energies per area (p,) of the p bonds marked by `which` (k,).
 
-        The energies are per area, for the bonds `which` (k,), in the modes of the tractions.
+        The tractions (k, c) determine the mode of each bond.
         """
         return np.zeros(int(which.sum()))
 

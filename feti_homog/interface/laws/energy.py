@@ -152,7 +152,7 @@ class ReleasedEnergy(SpringEnergy):
 
     @staticmethod
     def _activate(influence: exact_inverse.ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
-        """Update the inverse dual operator to a bond state.  Collective; raises as `in_state`."""
+        """Update the inverse dual operator to a bond state.  Collective; raises like `in_state`."""
         interface.prepare(bonds)
         if not influence.rounding <= UTILISATION_TIE:
             raise ConvergenceError(

@@ -76,7 +76,7 @@ class QuadraticStrength(Strength):
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the sum of squares is 1, without compression."""
+        """Return the load factors (p,) at which the squared utilisations sum to 1; compression does not count."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])

@@ -175,7 +175,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:
         return []
     name = "parallelogram" if half == 2 else "hexagon"
-    return [f'the cell is a {name}, expected a rectangle: see "Lattices that are no rectangle" in meshes/README.md']
+    return [f'the cell is a {name}, expected a rectangle: see "Lattices that are not rectangular" in meshes/README.md']
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
@@ -184,7 +184,7 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     Other groups keep their names. The entry `debonded` selects curves.
 
     Raises:
-        MeshError: names or numbers that no element has, in a line each.
+        MeshError: names or numbers that no element has, one per line.
     """
     pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], []
     for phase, name in pairs:

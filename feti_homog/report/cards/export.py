@@ -189,7 +189,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 
 
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
-    """Return the card for a result with a stiffness or a conductivity.  Raises as `SYMMETRIES` and `FORMATS`."""
+    """Return the card for a result with a stiffness or a conductivity.  Raises like `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
         return effective_material.conductor_card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))

@@ -1,6 +1,6 @@
-"""A coarse mesh of result.h5 for pictures, with the fields on this mesh.
+"""The mesh in result.h5, coarsened for pictures, with its fields.
 
-The mesh has at most about TRIANGLE_LIMIT triangles and is read in blocks.
+The coarse mesh has at most TRIANGLE_LIMIT triangles where the nesting allows; the file is read in blocks.
 """
 
 from collections.abc import Callable

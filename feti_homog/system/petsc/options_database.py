@@ -16,9 +16,9 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Set the options of a case for the block; options of the command line take precedence.
+    """Set the options of a case for the `with` block; options of the command line take precedence.
 
-    PETSc's flags cannot be false: false flags are removed for the block.
+    False flags are removed for the block: PETSc may take a flag as set, whatever its value.
 
     Raises:
         CaseError: before the block, if an option of this program is misspelt or has an invalid value, or if a solver

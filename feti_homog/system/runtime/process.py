@@ -1,6 +1,6 @@
 """Prepare and measure the process: environment, limits of the system, memory, import of Matplotlib.
 
-The environment is set before NumPy, h5py and MPI are imported.  With too low limits, the program would hang or crash
+The environment is set before NumPy, h5py and MPI are imported.  If limits are too low, the program would hang or crash
 without a message.
 """
 

@@ -1,9 +1,9 @@
 """Standard output and error (a failed write does not stop a run), progress, and signals that end the process.
 
-After Ctrl-C, or a signal of a launcher or batch system, the process prints one line and ends at once.  Python runs
-signal handlers only between its bytecodes, which a mesher or a factorization may delay for long; libraries replace
-handlers; and an exception in the middle of a collective call would leave other ranks waiting.  So the signals are
-blocked, and a thread waits for them.
+After Ctrl-C, or a signal from a launcher or batch system, the process prints one line and ends at once.  Python runs
+signal handlers only between bytecodes, so a mesher or a factorization may delay them for a long time; libraries
+replace handlers; and an exception in the middle of a collective call would leave other ranks waiting.  So the signals
+are blocked, and a thread waits for them.
 """
 
 from __future__ import annotations
