@@ -16,7 +16,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entry `angle`, with a point for each debonding angle.  Collective.
 
     A point has the stress under the strain of the case or, without a strain, the stiffness from unit loads.  The solve
-    at an angle starts from the multipliers at the angle before.
+    at an angle starts from the multipliers at the previous angle.
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)

@@ -1,4 +1,4 @@
-"""Records of the cell, fibres, solver, checks and sensitivities in result.json."""
+"""Define the records of the cell, fibres, solver, checks and sensitivities in result.json."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of n cell constants by p case constants, at fixed geometry."""
+    """Derivatives of n cell constants with respect to p case constants, at fixed geometry."""
 
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")

@@ -42,7 +42,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
     """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.
 
-    A fibre of radius a with the conductance h acts like a fibre with conductivity 1 / (1/k + 1/(h a)).  Collective.
+    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).  Collective.
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
@@ -66,7 +66,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
 def _note_bounds(
     context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
 ) -> None:
-    """Note conductivities across the fibres outside their bounds, as `constants.note_outside`."""
+    """Note conductivities across the fibres that lie outside their bounds, with `constants.note_outside`."""
     least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
     error = np.asarray(errors[:2, :2].max())
     limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener

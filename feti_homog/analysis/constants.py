@@ -1,4 +1,4 @@
-"""Constants that follow from the stiffness of a linear cell, with bounds, estimates and mesh errors."""
+"""Compute constants that follow from the stiffness of a linear cell, with bounds, estimates and mesh errors."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ OFF = 3.0  # largest ratio of the true energy error to the estimate
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    The result is empty if faces touch without tension, because each stiffness column is then a secant under a different
-    load, and for a plane cell with interfaces.
+    The result is empty for a plane cell with interfaces, and if faces touch without tension, because each stiffness
+    column is then a secant under a different load.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -181,7 +181,7 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
 def _note_bounds(
     context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside their bounds; record faults beyond any mesh error.
+    """Note constants outside their bounds; record a fault for each that no mesh error explains.
 
     The relative error of a constant is at most `energy`, the largest relative error of the strain energy; true errors
     are at most OFF times the estimates.  A bound applies only if the cell has the symmetry that the bound assumes.
@@ -202,7 +202,7 @@ def _note_bounds(
 def note_outside(
     context: AnalysisContext, limits: Mapping[str, Sequence[float]], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note each value outside its limits; if no mesh error explains it, record a fault, as `_note_bounds` does.
+    """Note each value outside its limits; record a fault if no mesh error explains the excess.
 
     The limits bound effective constants; constants of a cell that is not periodic may lie outside.
     """
@@ -243,7 +243,7 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note the mesh error under the first load if `accuracy` is set.  Collective."""
+    """Note if the mesh error under the first load exceeds `accuracy`.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

@@ -1,4 +1,4 @@
-"""The context of an analysis run: the cell under its loads, checks, recorders and progress."""
+"""Hold the cell under its loads, the checks, the recorders and the progress of an analysis run."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class AnalysisContext:
         directory: folder of the result, if any, where path events are stored.
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
-        events: name of the file with all these lines.
+        events: name of the file with the lines about all path events.
         opening: returns, as text, the entries of result.json that are known before the analysis.  Collective.
         undetermined: undetermined strains at each point under one load.
         excess: largest ratio of the strains under one load to the strains of the bonded cell.

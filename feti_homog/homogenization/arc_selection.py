@@ -1,4 +1,4 @@
-"""Debonded arcs in a cell: faults in the case, tips of arcs, and the element size at tips."""
+"""Find faults of debonded arcs in a cell, place the tips of arcs, and choose the element size at tips."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from feti_homog.mesh.outline import outline
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# The singular stress at a tip causes an energy error proportional to the element size there; the error of the rest is
-# of the order h^(2 order). At this fraction of the balanced size tips err no more (`scripts/measure_tips.py`).
+# The singular stress at a tip causes an energy error proportional to the element size there; elsewhere the order is
+# h^(2 order). At this fraction of the size that balances both, tips add little (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
 # Largest default ratio of the triangles that tips add to the triangles of a mesh for several openings.
 TIP_TRIANGLES = 2.0
@@ -38,12 +38,12 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
     """Return the element size at tips / cell width; None means the size on interfaces.
 
-    Without `tip_size` in the case the size is, for the mean fibre radius R / cell width,
+    Without `tip_size` in the case, the size follows from the ratio R of the mean fibre radius to the cell width,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    or larger with several openings, so that tips add at most TIP_TRIANGLES.  Along paths, and so in envelopes, tips
-    move: the size is then `tip_size` alone.
+    at most `interface_size`.  With several openings it may be larger, so that tips add at most TIP_TRIANGLES times the
+    triangles of the mesh.  Along paths, and so in envelopes, tips move: only `tip_size` then sets a size.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
@@ -104,7 +104,7 @@ class EstimatedNodes:
 def checked(
     case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
-    """Return the moved tips by interface, and the `faults` of the case with the faults of arcs.
+    """Return the moved tips by interface, and the `faults` of the case followed by the faults of arcs.
 
     Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
     select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.

@@ -1,4 +1,4 @@
-"""Macroscopic responses of a cell, errors in the balance laws, and debonded lengths of fibres.
+"""Average fields to macroscopic responses, measure errors in the balance laws, and sum debonded lengths of fibres.
 
 A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a stress has the conjugate entries.
 """
@@ -39,10 +39,10 @@ class Response:
             `hill`: <sigma:eps> = Sigma:E, Eq. (8), with the spring energy and the friction work on debonded faces;
             relative to the larger of <sigma:eps> and Reuss' energy bound for a bonded cell, because a debonded
             cell may store nothing; in a cell of one subdomain from the factor (`CondensedLoads.energy`).
-            `jump`: the largest opening at a glued node relative to the largest displacement, which does not vanish
-            without forces; absent in a cell of one subdomain.
+            `jump`: the largest opening at a glued node relative to the largest u* plus the largest displacement that
+            the loads impose; absent in a cell of one subdomain.
             `stress`: the largest error in a prescribed stress relative to the larger of the largest stress and the
-            least stress that the strains cause in a bonded cell.  The KKT certificate of contact follows.
+            least stress that the strains cause in a bonded cell.  The errors of the contact certificate (KKT) follow.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None without estimate.
@@ -84,7 +84,7 @@ class Response:
 
 
 class Homogenization:
-    """The averages over a torn cell with interfaces.
+    """Averages over a torn cell with interfaces.
 
     Attributes:
         law: bond law, without the energies released at tips; None without [interface].
@@ -125,7 +125,7 @@ class Homogenization:
     def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
         """Average an equilibrium, multiplied by `scale`.  Collective.
 
-        If `brief`, average a state without kernel amplitudes from its multipliers, and check only the contact.
+        If `brief`, a state without kernel amplitudes is averaged from its multipliers, and only the contact is checked.
 
         Raises:
             ConvergenceError: the numbers of the state are not finite.
@@ -201,7 +201,7 @@ class Homogenization:
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the largest error in a prescribed stress, relative to all stresses.  Collective."""
+        """Return the largest error in a prescribed stress, relative to the largest stress.  Collective."""
         load, scales = state.load, self.interface.scales
         # Roots of stiffnesses scale the stresses, so that all stresses have similar sizes.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)

@@ -1,4 +1,4 @@
-"""Interface faults, remarks on unexpected cell properties, and warnings about coarse interface elements."""
+"""List interface faults, remarks on unexpected cell properties, and warnings about coarse interface elements."""
 
 import math
 
@@ -11,12 +11,12 @@ from feti_homog.mesh import Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
-# Relative difference between fibre fractions, stiffness ratios or teeth that deserves no remark.
+# Largest relative difference between fibre fractions, stiffness ratios or peak tractions that deserves no remark.
 SAME_RATIO = 0.01
-# Largest element on an interface / length of the process zone. With a ratio of 0.54 the stresses of the square cell of
-# tests/parallel/test_energy.py are within 1.4 % of the stresses with elements a quarter as long, with 1.1 within 4.3 %.
+# Largest element on an interface / length of the process zone. At a ratio of 0.54, the stresses of the square cell in
+# tests/parallel/test_energy.py differ by 1.4 % from the stresses with elements a quarter as long; at 1.1, by 4.3 %.
 RESOLVED = 0.5
-# The ratio for cohesive laws, whose tractions fall along the process zone.
+# The same ratio for cohesive laws, whose tractions fall along the process zone.
 RESOLVED_SOFTENING = 1 / 3
 LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on interfaces / cell width
 
@@ -146,9 +146,9 @@ def longest(ends: Float) -> float:
 def process_zone(case: Case) -> float | None:
     """Return the least process zone length E' G_Ic / sigma_c^2.
 
-    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws G_Ic and sigma_c
+    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
     are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
-    E / (1 - nu^2) in plane strain, along the most compliant axis in all phases.
+    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
     for bond in case.interfaces:

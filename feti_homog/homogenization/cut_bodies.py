@@ -1,4 +1,4 @@
-"""Bodies in several pieces: shared vertices, sums over pieces, and stress fits across cuts.
+"""Find the vertices that pieces of a body share, sum values over pieces, and fit stresses across cuts.
 
 Each vertex and each coarse edge on a cut has a home rank, which knows all pieces with this vertex or edge.  An element
 patch about a shared vertex belongs to the body, not to a piece.
@@ -30,7 +30,7 @@ class SharedVertices:
         meshes: indices of this rank's meshes with shared vertices; a mesh has one or more pieces.
         classes: (n,) shared vertex classes in each such mesh.
         sides: (f, 2) vertices of the element sides along cuts, in each such mesh.
-        is_first: (f,) whether a side belongs to the first of its two pieces.
+        is_first: (f,) whether a side is the first of its two copies, one per piece.
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
@@ -95,7 +95,7 @@ class SharedVertices:
     ) -> list[Array]:
         """Combine the values (n, k) of equal rows (n, 3) on home ranks.  Collective.
 
-        `combine` takes the numbers of equal rows, and the values.  The results are arrays with the lengths of `parts`.
+        `combine` takes the values and one number per row, the same for equal rows.  Results are split like `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, position = distributed_arrays.exchange(
@@ -176,7 +176,7 @@ class _Strip:
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
         """Find the elements about the shared vertices `classes`.
 
-        Of the sides along a `cut` (c, 2), this piece counts only those marked by `is_first`.
+        Among the sides along a `cut` (c, 2), this piece counts only the sides marked by `is_first`.
         """
         is_vertex, corner_vertices = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True

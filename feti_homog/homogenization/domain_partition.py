@@ -33,9 +33,9 @@ class CellSummary:
         constituent_phase: (constituents,) index of the phase in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centres in the cell and radii of fibres, else NaN.
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
-        snapped: largest distance that a node in a user's mesh was moved to make sides match.
-        origin: lower left corner of the cell in the coordinates of the user; all other places are relative to it.
-        voids: void count.
+        snapped: largest distance by which a node in a user's mesh was moved to make opposite sides match.
+        origin: lower left corner of the cell in the user's coordinates; all other positions are relative to the corner.
+        voids: number of voids.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.
@@ -72,7 +72,7 @@ class CellSummary:
 
     @property
     def fibres(self) -> int:
-        """The fibre count."""
+        """The number of fibres."""
         return int(self.is_fibre.sum())
 
     @property
@@ -90,7 +90,7 @@ class CellSummary:
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
-        """List the changes made to a user's mesh."""
+        """Warn if nodes of a user's mesh were moved by more than rounding errors."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
         return [moved] if self.snapped > 64 * np.finfo(float).eps * (self.width + self.height) else []
 
@@ -125,7 +125,7 @@ def distribute(
 ) -> list[RankShare]:
     """Cut the cell, and deal the subdomains to the ranks.
 
-    Raises CaseError if an arc lies on a fibre that cannot have arcs, or selects no node.
+    Raises CaseError on interface faults, or if an arc lies on a fibre that cannot have arcs, or selects no node.
     """
     torus, halves = Torus.of(mesh), mesh.triangles.shape[1] - 2  # a pixel is two triangles
     numbers, is_fibre = mesh_fibres.fibre_numbers(torus)

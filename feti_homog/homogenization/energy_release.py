@@ -1,12 +1,12 @@
 """Energy release rate G = -d(energy) / d(debonded length) at tips, at constant strain.
 
 For rigid bonds G follows from a virtual crack extension, with an error like the energy error on any mesh.  The nodes
-around the tip, and the displacements of these nodes, turn about the fibre centre by s q; q is 1 near the tip and falls
-to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay constant.  This is
-an admissible variation of the equilibrium, and G follows from the change of the element energies.
+around the tip, and the displacements of these nodes, turn about the fibre centre by an angle s q; q is 1 near the tip
+and falls to 0 farther away.  The tip moves along the interface by s R (R: fibre radius), bonded nodes stay bonded, and
+gaps stay constant.  This is an admissible variation, and G follows from the change of the element energies.
 
-G is split into modes in the ratio of the work that closes the crack's last part (virtual crack closure).  This ratio
-depends on the length of this part, because between two materials the stress oscillates towards the tip.
+G is split into modes in proportion to the work in opening and in shear that closes the last part of the crack (virtual
+crack closure).  The split depends on the length of this part, for the stress oscillates at a tip between two materials.
 
 For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
 """
@@ -29,13 +29,13 @@ from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
-# Closed length that separates the modes / fibre radius; the length has at least one element.
+# Closed length from which the modes are determined / fibre radius; the length has at least one element.
 MODE_LENGTH = 1e-3
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 # REACH: radius of the turning nodes about a tip / distance to boundaries.  REACH_OF_A_PERIOD: largest such radius /
 # cell period.  CORE: radius within which all nodes turn by the same angle / radius of the turning nodes.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
-# Relative distance from a circle beyond which a node of both bodies is on another boundary, or on another image.
+# Relative distance from a circle beyond which a node of its two bodies lies on another boundary or periodic image.
 OFF_CIRCLE = 1e-4
 
 
@@ -52,7 +52,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the energy change when a crack tip turns by a unit angle.
+        """Return the derivative of the energy with respect to the angle by which a crack tip turns.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.
@@ -133,7 +133,7 @@ class EnergyReleaseRates:
         self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
         self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
         # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, -1 at voids. Each body has its own nodes
-        # where two bodies meet; cuts between a body's pieces are no boundaries.
+        # where two bodies meet; cuts between a body's pieces are not boundaries.
         borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in cell.subdomains]
         rows, points, body = [np.zeros((0, 2), np.int64)], [np.zeros((0, 2))], [np.zeros(0, np.int64)]
         for s, border in zip(cell.subdomains, borders, strict=True):
@@ -209,12 +209,12 @@ class EnergyReleaseRates:
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """Return the work that closes each crack, and the closed lengths (t,).
 
-        The work is `closing_work` (t, 2) in opening and in shear.  A length is MODE_LENGTH times the
-        radius, or the length of the element behind the tip if that is larger.
+        The work is `closing_work` (t, 2) in opening and in shear.  A closed length is the larger of MODE_LENGTH times
+        the radius and the length of the element behind the tip.
         """
         least, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(least), 2)), np.zeros(len(least))
-        # Nodes of a chain within these lengths at most, and one element more.
+        # The largest number of chain nodes within these lengths, plus one element.
         counts = self._tree.query_ball_point(in_cell(self.points[tips.node], self._period), least, return_length=True)
         steps = order + int(counts.max(initial=1))
         chains = [self._chains.onward(tips.node, start, steps) for start in (tips.behind, tips.ahead)]

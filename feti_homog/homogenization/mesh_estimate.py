@@ -1,6 +1,6 @@
-"""The mesh error in the energy of each pair of responses, estimated by recovered stresses.
+"""Estimate the mesh error in the energy of each pair of responses by recovered stresses.
 
-The recovered stresses in a body satisfy the tractions at interfaces, multipliers divided by lengths, and at voids.
+The recovered stresses in a body satisfy the tractions at voids and at interfaces (multipliers divided by lengths).
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.cut_bodies import SharedVertices
 
 # Ratios of element and arc errors to the errors on coarser meshes (`scripts/measure_mesh_error.py --factors`).  NESTED:
-# one and two halvings less, by element order.  LOCKED: cells with a phase that locks, for quadratic elements from true
-# errors.  SAMPLED: one halving less, with fine displacements at the coarse nodes, by whether elements have bubbles.
+# one and two halvings fewer, by element order.  LOCKED: cells with a phase that locks; true errors gave the ratios of
+# quadratic elements.  SAMPLED: one halving fewer, with fine displacements at coarse nodes, by whether bubbles exist.
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
 SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
-# Element and arc errors may cancel; the smallest fractions that remain (`scripts/measure_mesh_error.py`).  LEAST_SHARE:
+# Element and arc errors may cancel; at least these fractions remain (`scripts/measure_mesh_error.py`).  LEAST_SHARE:
 # on the diagonal, and for two states if quadratic elements have interfaces that may part, or if few corners have most
 # of the error.  LEAST_OF_TWO: for other pairs of states, by element order.
 LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
@@ -46,7 +46,7 @@ class EnergyErrors:
             spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
         shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
-        least_of_two: least ratio, off the diagonal, of the error to the geometric mean of both |elements| + |arcs|.
+        least_of_two: least ratio, off the diagonal, of an error to the geometric mean of two |elements| + |arcs|.
     """
 
     elements: Float
@@ -61,7 +61,7 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """The smallest error (k, k) that remains when both parts cancel."""
+        """The smallest error (k, k) that remains where `elements` and `arcs` cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
@@ -101,7 +101,7 @@ def energy_errors(
         elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
     is_uneven = _has_corners(cell) or (lattice.order == 2 and bool(cell.case.interfaces))
     smallest = LEAST_SHARE if is_uneven else LEAST_OF_TWO[lattice.order]
-    # Where faces touch at different positions the energy is not bilinear: nothing cancels.
+    # If faces touch at different positions in two responses, the energy is not bilinear: nothing cancels.
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, 1.0 if contact else smallest)
 
 
@@ -118,9 +118,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether the mesh error follows from a coarser mesh.  Collective.
 
-    Errors fall more slowly at corners and tips.  The result is false for cells with fibres other than circles and
-    ellipses, or with straight sides at voids; and for debonded arcs with quadratic elements, or with tips to which the
-    mesh is not graded, because the case sets `tip_size` or bonds break.
+    Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with fibres other than
+    circles and ellipses or straight sides at voids, and for linear elements without interfaces.  For debonded responses
+    it is true only if the elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
     """
     lattice = cell.lattice
     pieces = (s.submesh for s in cell.subdomains)
@@ -144,7 +144,7 @@ def _recovered(
     """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
     On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
-    displacements at the coarse nodes instead, with hardly smaller errors.
+    displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
@@ -221,7 +221,7 @@ def boundary_tractions(
         rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
         loaded = np.flatnonzero(free | (of_node[position[ends]] > 0))
         columns = [np.bincount(ends[loaded], row, len(position)) for row in rows[loaded].T]
-        sums.append(np.stack(columns, axis=1).astype(float))  # of no sides: integers
+        sums.append(np.stack(columns, axis=1).astype(float))  # bincount without sides: integers
     if shared is not None:
         parts = [sums[number][classes] for number, classes in zip(shared.meshes, shared.classes, strict=True)]
         for number, classes, total in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):

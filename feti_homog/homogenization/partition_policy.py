@@ -1,4 +1,4 @@
-"""The piece count, and estimates of memory, useful ranks and dual operator applications.
+"""Choose the piece count, and estimate memory, useful ranks and dual operator applications.
 
 The memory is linear in the degrees of freedom, because bodies are cut into equally large pieces.
 `scripts/measure_cost.py` measures the constants.
@@ -21,7 +21,7 @@ from feti_homog.microstructure import phase_names
 from feti_homog.system.petsc import option_table, options_database
 from feti_homog.typing import Int
 
-# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
+# Poisson's ratio up to which lambda adds little to the stiffness at single nodes of mixed elements (`SCALED_LAME`).
 MOST_POISSON = 0.45
 # Stiffness ratio up to which a subdomain may have several phases: at larger ratios, rounding in dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
@@ -31,7 +31,7 @@ TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 # Bytes of a rank without degrees of freedom, per degree of freedom, and per multiplier with stored influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
-# 31 000 to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, with order 2 0.85 times.
+# 31 000 to 271 000 degrees of freedom, estimates are 0.93 to 1.07 times the measured memory; at order 2, 0.85 times.
 FACTOR_BYTES = 2.9e2
 # Additional bytes of a path to complete debonding: for each multiplier of a rank, and for each pair of a multiplier and
 # an influence column; a cell that is factored anew has `INFLUENCE_COLUMNS` columns.  For five paths with 1 to 50 fibres
@@ -40,7 +40,7 @@ FACTOR_BYTES = 2.9e2
 PATH_BYTES, PAIR_BYTES = 7e4, 50
 # Degrees of freedom below which a further rank waits longer than it computes.
 DOFS_OF_A_RANK = 50_000
-# Typical numbers for the choice of operators; iterations with coatings are those without influence columns.
+# Typical numbers for the choice of operators; the iterations with coatings are counted without influence columns.
 ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 400, 3, 100
 
 
@@ -53,11 +53,11 @@ class PartitionPolicy:
             dense matrices.
         piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
         cut_factor: ratio of a bonded body to a piece, by size or boundary, above which the body is cut.
-        even_cut_factor, even_share: the factor replaces `cut_factor` for bodies up to this fraction of a rank's load,
-            which the ranks balance without cuts.
+        even_cut_factor, even_share: `even_cut_factor` replaces `cut_factor` for bodies up to the fraction `even_share`
+            of a rank's load: ranks balance such bodies without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as their boundaries' dense matrices are small.
-        tiles: tiles in the coarse mesh.
+        tiles: rules for the tiles of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body; so are
             label images of any size, whose bodies have long boundaries; 0 for no such cuts.
         across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
@@ -124,7 +124,7 @@ def wanted_pieces(
 ) -> Int:
     """Choose the piece count (b,) of each body.
 
-    The case, or else the policy, determines the numbers; each rank gets at least one piece.
+    The case determines the counts, or else the policy, which gives each rank at least one piece.
 
     Args:
         load: (b,) coarse triangles in each body.
@@ -151,10 +151,10 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate the number of dual operator applications, also for pieces `across` phases."""
+    """Estimate the number of dual operator applications; `across` means that pieces reach across phases."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # the mesh may have a curve "debonded"
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
-    contact = touches and problem.turns  # along the fibres nothing touches
+    contact = touches and problem.turns  # in axial shear no faces touch
     bond = case.interface
     by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
     # Envelopes with arcs need the inverse operator, which pays for many solves.
@@ -181,7 +181,7 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
     """Estimate the memory of the largest rank after all bonds break, in bytes.
 
-    `few` is the memory of this rank before the breaks.
+    `few` is the memory of this rank before bonds break.
     """
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
@@ -189,7 +189,7 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return the rank count that a cell can use.
+    """Return the largest useful rank count of a cell.
 
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
     that are cut across materials, `bodies` counts coarse triangles.

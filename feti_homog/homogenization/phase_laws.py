@@ -1,8 +1,8 @@
-"""The problems on the plane mesh, with phase stiffnesses, springs and bond strengths.
+"""Choose the problems on the plane mesh, with their phase stiffnesses, springs and bond strengths.
 
 In generalized plane strain the plane problem has the loads e = [E11, E22, gamma12, E33, T] with a temperature change
-T, and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] with the
-conjugate to T, and 1/2 e.A e is the stored energy.
+T, and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] followed
+by the conjugate of T, and 1/2 e.A e is the stored energy.
 """
 
 import math
@@ -34,7 +34,7 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
 
 def law(case: Case, phase: str, problem: Problem) -> Float:
-    """Return the phase stiffness A (v, v) in a problem."""
+    """Return the phase stiffness or conductivity A (v, v) in a problem."""
     material = case.material_of(phase)
     if problem in (PLANE, CONDUCTION):
         return (
@@ -106,7 +106,7 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return the springs of a problem; by default axial springs are like tangential springs.
+    """Return the springs of a problem; by default axial springs have the tangential stiffness.
 
     The springs of conduction are conductances.
     """
@@ -131,8 +131,8 @@ def has_springs(case: Case) -> bool:
 def strength_factors(case: Case, fibres: int) -> Float:
     """Return the ratios (fibres,) of fibre bond strengths to the strength in the case.
 
-    f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution with modulus m and mean 1, times the
-    column `strength` in a fibre table.  Fibre N takes the generator's N-th number in any cell.
+    A ratio is (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution with modulus m and mean 1),
+    times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th number of the generator.
     """
     factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
     if scatter is not None:

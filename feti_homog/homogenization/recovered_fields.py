@@ -1,4 +1,4 @@
-"""The response fields, and the largest stresses in each phase.
+"""Recover the fields of responses, and find the largest stresses in each phase.
 
 Fields are nodal displacements, element means of stresses, tractions and jumps.  The largest stresses are at the
 integration points: one point in a linear element, six points in a quadratic element.
@@ -25,7 +25,7 @@ ROUNDING = 1e4 * np.finfo(float).eps
 
 
 Largest = tuple[Float, Float]
-"""The largest value (v,) of each measure, of the utilisation in each mode, and its position (v, 2)."""
+"""The largest value (v,) of each measure, with one utilisation per mode, and the position (v, 2) of each value."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class RecoveredFields:
 
     Attributes:
         displacement: u* (dofs, s) of the parts in each problem; 0 without a response.
-        stress: (s, 6, e) means over the elements, as `voigt.SPATIAL_STRESSES`; fluxes as shear along the fibres.
+        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; fluxes replace the axial shears.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
             hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
     """
@@ -70,7 +70,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
     by_phase: list[dict[str, list[Largest]]] = [{phase: [] for phase in cell.summary.phases} for _ in states]
     first, is_scalar = 0, voigt.PLANE_STATES[cell.case.analysis.plane].is_scalar
     components = [*voigt.IN_PLANE, 2] if cell.solver.problem.turns and cell.axial is None else [*range(6)]
-    # Ranks without parts, too, begin with all problems, whose parts are collective: so strict.
+    # Ranks without parts must also start the generator of every problem, which is collective: hence `strict`.
     for chunks in zip(*passes, strict=True):
         phase, chunk = chunks[0][:2]
         stress, without_noise = sum(stresses for *_, stresses in chunks)
@@ -87,7 +87,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
 
 
 def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: Problem) -> NodalFields:
-    """Compute the nodal fields of a response with the recovered u* (dofs,); zero without one.  Collective."""
+    """Compute the nodal fields of a response with the recovered u* (dofs,); zero without a response.  Collective."""
     nodes, c = cell.jumps.nodes, problem.components
     if response is None:
         n, k = sum(len(part.mesh.points) for part in cell.parts), len(nodes.row)
@@ -124,7 +124,7 @@ def _stresses(
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
     """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; write u* to `out` (dofs, s).
 
-    The second array has 0 in place of rounding errors.
+    The second of the two stress arrays has 0 in place of rounding errors.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
@@ -132,7 +132,7 @@ def _stresses(
     for (part, displacement), offset in zip(cell.displacements(u, all_loads), cell.offsets, strict=False):
         out[offset : offset + len(displacement), at] = displacement
         L, problem, m = part.L, part.problem, part.problem.strains
-        # The stresses in space follow from those conjugate to displacement strains.
+        # The stresses in space follow from the stresses conjugate to strains of displacements.
         rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))
         rows[voigt.IN_PLANE if problem.turns else phase_laws.AXIAL_SHEAR] = np.eye(m)
         if len(loads) > m:  # S33 is conjugate to the load E33
@@ -151,7 +151,7 @@ def _stresses(
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Return the `MEASURES` (n, v) of stresses (n, 6), with lower bounds for small principal stresses."""
+    """Return the `MEASURES` (n, v) of stresses (n, 6); principal stresses far below the largest are lower bounds."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
     if not shears.any():

@@ -1,4 +1,4 @@
-"""The energy errors of nodal springs, which add to the element and arc errors."""
+"""Estimate the energy errors of nodal springs, which add to the element and arc errors."""
 
 from collections.abc import Sequence
 
@@ -71,7 +71,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """Return the energy errors (k, k) beyond tips, and along sides less `arc_energy`.  Collective.
+        """Return the energy errors (k, k) beyond tips, and along sides without the part in `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.
@@ -87,7 +87,7 @@ class SpringSides:
         status, holds, stiffness, force, jump = (
             np.concatenate(table) for table in zip(*self._comm.allgather(state), strict=True)
         )
-        # The energy counts springs on the whole length of a tip, but the part on the debonded side has no springs.
+        # The energy counts springs on the whole length of a tip node, but on the debonded side there are none.
         tips = self._chains.tips(status)
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
         behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)

@@ -1,4 +1,4 @@
-"""Derivatives of stiffness and conductivity by phase and elastic interface constants, without further solves.
+"""Differentiate stiffness and conductivity with respect to phase and interface constants, without further solves.
 
 Let e_i be the strains under the unit load i, followed by the other uniform loads.  The stiffness of a linear cell is
 
@@ -7,8 +7,8 @@ Let e_i be the strains under the unit load i, followed by the other uniform load
 and because the fields make C_ij stationary, dC_ij has dA and dk in place of A and k, exactly for the discrete cell.
 Bodies enter only by the integrals, one per phase.  A cell with contact is linear as long as no face opens or closes.
 
-If all fibres grow, the fibre fraction f changes by d f / d ln R = 2 f, and the stiffness by the energy change on a
-moving mesh at fixed nodal u - E x: exactly for the mesh, wherever the nodes between the fibres move.
+If all fibres grow, the fibre fraction f changes at the rate d f / d ln R = 2 f, and the stiffness at the rate of the
+energy on a moving mesh with fixed nodal u - E x.  This is exact for the mesh, however nodes between the fibres move.
 """
 
 from __future__ import annotations
@@ -92,16 +92,16 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """Integrate the strain products and the energy change by fibre growth.  Collective.
+    """Integrate the strain products and the energy change with fibre growth.  Collective.
 
-    Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the energy derivatives (k, k) by ln R of all
-    fibres, which are 0 unless the case has a fraction in `_fractions`.
+    Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the derivatives (k, k) of |UC| C with respect
+    to ln R of all fibres, which are 0 unless the case has a fraction in `_fractions`.
     """
     problem, all_loads = cell.solver.problem, np.stack([response.all_loads for response in responses], axis=1)
     loads = all_loads[: len(problem.loads)]
     boundary = np.stack([response.u for response in responses], axis=1)
     m, (v, k) = problem.strains, loads.shape
-    # From [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
+    # T maps [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))
     T[: m * k, : m * k], T[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
@@ -127,14 +127,14 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 class _Fields:
     """The fields in e elements at q points under k loads.
 
-    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u the energy is the
-    strain energy less lambda r^2, r = div u - Pi div u.
+    In mixed elements the energy is also stationary in the bubble; with the pressure lambda Pi div u, its density is
+    the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
 
     Attributes:
         gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
         slopes: (e, q, 2, c, k) du_i / dx_d.
         strain: (e, q, m, k) with the loads.
-        rest: (e, q, k) r; None in other elements.
+        rest: (e, q, k) r; None unless the elements are mixed.
     """
 
     gradients: Float
@@ -160,14 +160,14 @@ class _Fields:
         """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1]."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
-        if self.rest is not None:  # 11 and 22 products have -d lambda r^2 from isotropic dA
+        if self.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22
             change = _gram(self.rest, self.weights) / 2
             gram[:k, k : 2 * k] -= change
             gram[k : 2 * k, :k] -= change
         return gram
 
     def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
-        """Differentiate int e_i A e_j (k, k) by s, while nodes move by s V.
+        """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V.
 
         At fixed displacements the derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with
         d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the other loads.

@@ -46,7 +46,7 @@ def place_nodes(
     Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.
 
     Raises:
-        CaseError, MeshError: on every rank, as `begin_mesh`.
+        CaseError, MeshError: on every rank, as in `begin_mesh`.
     """
     cell = mpi_errors.on_root_only(comm, begin_mesh, case, policy)
     unmeshed = cell if isinstance(cell, gmsh_mesher.UnmeshedCell) else None
@@ -124,8 +124,8 @@ def can_be_torn_by_tiles(
 ) -> bool:
     """Return whether the ranks can cut the cell without the whole mesh.
 
-    Arc tips, bodies cut by the sides, a matrix in fewer pieces than tiles, and cells that are probably small enough for
-    cuts across materials, need the whole mesh on one rank.  A user's mesh is on one rank already.
+    Arc tips, bodies cut by the sides, a given subdomain count, which may be below the tile count, and cells probably
+    small enough for cuts across materials need the whole mesh on one rank.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -145,7 +145,7 @@ def tear_by_tiles(
     """Tear a cell by its tiles, and return this rank's part.  Collective.
 
     Raises:
-        CaseError, MeshError: on every rank, as `tiled_cell` and `tile_filling.fill`.
+        CaseError, MeshError: on every rank, as in `tiled_cell` and `tile_filling.fill`.
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
@@ -161,7 +161,7 @@ def tear_by_tiles(
     pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = mpi_errors.agree(comm, _cut, torus, tile, pieces / load, longest)
-    # Numbers of subdomains follow the body, then the tile, on all ranks together.
+    # Subdomains are numbered by body, then by tile, over all ranks.
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
@@ -210,7 +210,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """Assign a rank to each subdomain (s,) by the `neighbours` of all ranks."""
+    """Assign a rank to each subdomain (s,), given the `neighbours` of all ranks."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)

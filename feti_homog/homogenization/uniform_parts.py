@@ -1,4 +1,4 @@
-"""One-body parts of subdomains, and displacements on coarser meshes.
+"""Split subdomains into one-body parts, and find displacements on coarser meshes.
 
 A subdomain in one material is one part; a subdomain across materials has one part for each body.  A coarser mesh has a
 quarter or a sixteenth of the elements, and its nodes are also nodes of the finer mesh.
@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Halvings from which a mesh with two halvings less gives the error, except across materials and where a phase locks.
+# Number of halvings from which a mesh with two fewer gives the error, except across materials and if a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on that mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
 # coarse elements lock, and their errors say little about the fine mesh.
@@ -106,7 +106,7 @@ class ForcesBetweenParts:
     """The multipliers that keep each part in equilibrium under given displacements."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble the coarse triangles with constrained nodes.  Collective."""
+        """Assemble the coarse triangles at nodes that parts share.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)

@@ -1,4 +1,4 @@
-"""The torn cell: the subdomains of a case with the solver for their interfaces."""
+"""Tear the cell of a case into subdomains, with the solver for their interfaces."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class TornCell:
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
-        """The lattice of the coarser mesh: one or two halvings less.  Collective when first read."""
+        """The lattice of the coarser mesh: one or two halvings fewer.  Collective when first read."""
         often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
         return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
