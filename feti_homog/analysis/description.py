@@ -71,7 +71,7 @@ def _cost_lines(
     `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.
 
     Raises:
-        CaseError: as `solver_plan.choose`, or a case with friction has no influence columns.
+        CaseError: as in `solver_plan.choose`, or if a case with friction has no influence columns.
     """
     problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across

@@ -99,7 +99,7 @@ def _points(
     The path ends with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
 
     Raises:
-        NotCarriedError: the cell carries the stresses of no point.
+        NotCarriedError: the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))

@@ -1,4 +1,4 @@
-"""The events of a path: accumulated energies and checkpoint arrays."""
+"""Accumulate the energies of a path, and convert its points to checkpoint events and back."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -44,7 +44,7 @@ class Work:
     _largest_load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies between the last point and `point`."""
+        """Add the energies between the previous point and `point`."""
         # Loads never fall after the first leg.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
@@ -177,9 +177,9 @@ def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, pat
 
 
 def resumable(context: AnalysisContext) -> int:
-    """Count the checkpoint events that a run can reuse, and drop all other events.  Collective.
+    """Count the checkpoint events that a run can reuse.  Collective.
 
-    A run that does not resume drops all events; otherwise the events before the first invalid event count.
+    A run that does not resume drops all events; a resumed run reuses the events before the first invalid event.
 
     Raises:
         CaseError: the checkpoint cannot be used.
@@ -213,7 +213,7 @@ def consistent(context: AnalysisContext, count: int) -> int:
         leg = int(np.clip(np.ceil(point.load_factor * legs - path_curves.SAME_LOAD), 1, legs))
         start, end = waypoints[leg - 1 : leg + 1]
         load = start.after(point.load_factor * legs - leg + 1, end)
-        # Components whose kind changes begin where the leg before has ended.
+        # Components whose kind changes begin where the previous leg has ended.
         change = np.where(start.by_stress == end.by_stress, np.choose(load.by_stress, means) - load.values, 0.0)
         errors = np.abs(event["macroscopic"][2:] - means)
         errors[load.by_stress.astype(int), np.arange(len(change))] += np.abs(change)

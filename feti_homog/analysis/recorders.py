@@ -1,4 +1,4 @@
-"""Recorders of a run: checks of the responses (convergence, law errors), and states with fields."""
+"""Record the checks of the responses of a run (convergence, errors of laws), and states with fields."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The result of a case as a Python object: the content of result.json, and fields in memory."""
+"""Represent the result of a case as a Python object: the content of result.json, and fields in memory."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOADS = ("strain", "stress", "temperature", "to", "waypoints", "first_break_stra
 ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
             "toughness", "G_I", "G_II")  # fmt: skip
 POWERS = dict.fromkeys(LOADS, 1) | dict.fromkeys(ENERGIES, 2)
-"""Powers of s for entries of result.json and the tables and lists inside them; other numbers do not change."""
+"""Powers of s in `Result.path_scaled` for entries of result.json and for all numbers inside; others do not change."""
 CONSTANTS = ("moduli", "constants", "transversely_isotropic", "transverse_moduli")
 Part = TypeVar(
     "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart
@@ -213,11 +213,11 @@ class Result:
     def path_scaled(self, *, toughness: float) -> Result:
         """Return the path for another toughness of the first interface.
 
-        With s = sqrt(toughness / toughness in the case), s times the loads and s^2 times the toughness of every
-        interface, the same events have s times the strains and stresses and s^2 times the energies, provided that
-        bonds break by energy on springs of fixed stiffness: such springs break at tractions proportional to s, and the
-        response of a cell with contact has degree one in the loads.  The result has no fields, states or digest, which
-        only a run makes.  Raises ValueError for any other result, and for a toughness that is not positive.
+        With s = sqrt(toughness / toughness in the case), loads times s and every toughness times s^2 lead to the same
+        events, with strains and stresses times s and energies times s^2.  This holds if bonds break by energy on
+        springs of fixed stiffness, for such springs break at tractions proportional to s, and the response of a cell
+        with contact has degree one in the loads.  The result has no fields, states or digest, which only a run makes.
+        Raises ValueError for any other result, and for a toughness that is not positive.
         """
         from feti_homog.results import path_curves  # unused in other analyses
 

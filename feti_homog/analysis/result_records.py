@@ -1,4 +1,4 @@
-"""Records of points, tips and mesh errors in result.json, the fields of `result.Result`.
+"""Define the records of points, tips and mesh errors in result.json, which are fields of `result.Result`.
 
 Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
 plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
@@ -71,7 +71,7 @@ class Tips:
 class TipRates:
     """The energy release rates at tips of arcs, at constant macroscopic strain.
 
-    The fibres are round.  The t pairs of a load and a tip are sorted by load, fibre, interface and direction.
+    Only round fibres have rates.  The t pairs of a load and a tip are sorted by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(

@@ -81,7 +81,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) 
     """Tear the cell while the PETSc options of the case are set.  Collective."""
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
     process.forget_peak(kept=SPARE_BYTES)
-    for warning in case.warnings():  # all warnings while there is time to stop the run; remarks in the summary
+    for warning in case.warnings():  # while there is time to stop the run; the summary has the remarks
         progress.say(f"warning: {warning}")
     with options_database.case_options(case.petsc):
         cell = None
@@ -114,8 +114,8 @@ def _run_and_write(
     ):
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        # No function of the context may hold it: the garbage collection of a rank would then close the parallel file, a
-        # collective call.
+        # No function in the context may refer to the context: garbage collection on one rank would then close the
+        # parallel file, which is a collective call.
         context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
         context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
         analysis = _analyse(context)

@@ -1,4 +1,4 @@
-"""Derivatives of stiffness and its constants, conductivity, or a loaded state, by constants of phases and springs."""
+"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to phase and spring constants."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ def sensitivities(
         document: the entry `effective_conductivity`; or `effective_stiffness` and, if a temperature is a load,
             `thermal_stress`.
         responses: the responses to all unit loads.
-        one_sided: debonded faces touch without tension; each column is then differentiated with its faces fixed.
+        one_sided: whether debonded faces touch without tension; then faces are fixed in the derivative of each column.
     """
     k, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
     if k is not None:

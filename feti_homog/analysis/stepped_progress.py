@@ -1,4 +1,4 @@
-"""The progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
+"""Show the progress of a long computation in steps: a bar on a terminal, one line per minute in a file."""
 
 import shutil
 import time
@@ -19,7 +19,7 @@ def shown(
     """Show the finished share of a computation, the rate of steps, and the time used and left.
 
     The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
-    time left assumes that the rest of the share takes as long as the share since the last known step.
+    time left assumes that the share keeps growing at its mean rate since the last known step.
     """
     if (within := progress.within) is not None:
         yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")
@@ -30,7 +30,7 @@ def shown(
     if progress.on_terminal:
         from tqdm import tqdm  # unused in most runs, and slow to import
 
-        columns, rows = shutil.get_terminal_size()  # 80 x 24 of a terminal that says 0 x 0
+        columns, rows = shutil.get_terminal_size()  # 80 x 24 for a terminal that reports 0 x 0
         look = "{l_bar}{bar}| {elapsed} used{postfix}"
         bar = tqdm(total=1.0, desc=label, bar_format=look, leave=False, ncols=columns, nrows=rows)
 

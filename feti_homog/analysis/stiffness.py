@@ -11,8 +11,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entry `effective_stiffness` and the constants that follow from it.  Collective.
 
     Contact between debonded faces adds `effective_stiffness_compression`, with columns -Sigma(-E); debonded arcs add
-    `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature, with contact
-    `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
+    `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature and, with
+    contact, `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()

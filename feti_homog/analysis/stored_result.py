@@ -14,7 +14,7 @@ from feti_homog.schema import keys, wording
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read a result, checked with result.h5 if the case keeps fields, or an unfinished path.  Call on one rank.
+    """Read a result or an unfinished path; check result.h5 if a result keeps fields.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.
@@ -50,7 +50,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
     """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
 
     Raises:
-        CaseError: the result is damaged or belongs to another case, the checkpoint also to another number of ranks.
+        CaseError: the result or checkpoint is damaged or of another case, or the checkpoint of another rank count.
     """
     path = directory / checkpoints.FOLDER / checkpoints.NAME
     if path.parent.is_dir():
@@ -95,7 +95,7 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
     try:
-        if "unfinished" in document:  # whose checks and faults follow at the end
+        if "unfinished" in document:  # checks and faults follow at the end
             document = {**document, "faults": (), "checks": {"strain": 0.0, "hill": 0.0, **document["checks"]}}
         result = Result.of(document)
         cases.check_stored(result.case)

@@ -1,4 +1,4 @@
-"""Debonding tips in result.json: their bond law, driving energies, release rates and modes."""
+"""Collect the debonding tips in result.json, with their bond law, driving energies, release rates and modes."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Energy error of straight or parabolic element sides that replace circular arcs.
+"""Estimate the energy error of straight or parabolic element sides that replace circular arcs.
 
 The sides take area from a body or add area to it, and displacements along a side are polynomials between its nodes.
 Every body computes its error without communication; the contributions of two glued bodies cancel on their interface.
@@ -100,7 +100,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     tangent = chord / h
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
     gradient = loads[:, body.problem.voigt]
-    if body.problem.components == 2:  # strains give its symmetric part, and nodes give du/ds along the side
+    if body.problem.components == 2:  # strains give the symmetric part, and nodes give du/ds along the side
         gradient[:, [0, 1], [1, 0]] /= 2
         u = body.u[body.node_class[sides.nodes]]
         along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", macroscopic, tangent)

@@ -1,4 +1,4 @@
-"""Assembly in one subdomain: stiffness, unit strain loads, averages, integrals along voids.
+"""Assemble the stiffness, unit strain loads, averages and integrals along voids of one subdomain.
 
 Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
 summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
@@ -173,7 +173,7 @@ class MacroElement:
         couples: sums of the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: sums over the element nodes (4**refine, a) to the q lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) products of second derivatives (`MixedElements`), summed over quadratic elements; else 0.
+        hessians: (p, 9) sums over elements of products of second derivatives (`MixedElements`); 0 if linear.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 

@@ -1,4 +1,4 @@
-"""Communication of distributed arrays (sums, gathers, exchanges of rows) and of Python objects; division of loads.
+"""Communicate distributed arrays (sums, gathers, exchanges of rows) and Python objects; divide loads among ranks.
 
 mpi4py's exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent in place.
 """

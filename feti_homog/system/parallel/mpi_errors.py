@@ -1,4 +1,4 @@
-"""Calls on rank 0 or on all ranks whose exceptions are raised on every rank, so that no rank waits forever."""
+"""Call functions on rank 0 or on all ranks, and raise exceptions on every rank, so that no rank waits forever."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T |
     except OSError as error:
         if error.filename is None:
             return None, error
-        return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a fault of the file, no defect
+        return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a fault of the file, not a defect
     except Exception as error:
         return None, error
 

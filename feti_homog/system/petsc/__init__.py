@@ -1,4 +1,4 @@
-"""PETSc: its options and their faults, its libraries, exceptions in callbacks, C functions without a binding.
+"""Check PETSc's options, start its libraries, keep exceptions of callbacks, and call C functions without a binding.
 
 Imports `system.parallel` and `system.runtime`.  Main entry: `options_database.case_options`.
 """

@@ -1,4 +1,4 @@
-"""Functions of PETSc's C interface that petsc4py 3.18 does not bind, and exceptions in callbacks.
+"""Call functions of PETSc's C interface that petsc4py 3.18 does not bind, and keep exceptions of callbacks.
 
 The extension module of petsc4py resolves PETSc's symbols, so that no library search is needed.
 """

@@ -1,4 +1,4 @@
-"""Search and start of the libraries that need one common MPI, which pip does not install."""
+"""Import the libraries that need one common MPI, which pip does not install, and start PETSc."""
 
 import atexit
 import importlib
@@ -47,7 +47,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     the program refuses misspelt options itself, and one set of options serves all runs.
 
     Raises:
-        LibraryError: petsc4py was built for another NumPy.
+        LibraryError: petsc4py cannot be loaded, for example because it was built for another NumPy.
     """
     import petsc4py
 
@@ -70,7 +70,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         import numpy as np
         from scipy.linalg import blas
 
-        # Let every BLAS allocate its buffers now: under a limit of addresses, OpenBLAS might later retry for ever.
+        # Let every BLAS allocate its buffers now: under a limit on addresses, OpenBLAS might later retry forever.
         square = np.eye(200)
         blas.dgemm(1.0, square @ square, square)
         matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
@@ -99,7 +99,7 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Return the fault of a module that cannot be imported; an error about NumPy means a build for another one."""
+    """Return the fault of a module that cannot be imported; an error about NumPy means a build for another NumPy."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np

@@ -1,4 +1,4 @@
-"""Names of options: of the solver, of PETSc, and misspelt names."""
+"""List the option names of the solver and of PETSc, and find misspelt names."""
 
 import difflib
 import re
@@ -17,7 +17,7 @@ class Option:
 
 
 def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[Option, Option]:
-    """Return the options of a direct solver with a prefix, for a matrix in words."""
+    """Return the options of a direct solver by its prefix; `matrix` names its matrix in the help."""
     return (
         Option(f"{prefix}pc_type", "cholesky|lu", "cholesky", f"factorization of {matrix}"),
         Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", library, f"library of {matrix}"),
@@ -25,7 +25,7 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """Return the options of the solver with a prefix, for a distributed matrix in words."""
+    """Return the options of a coarse solver by its prefix; `matrix` names its distributed matrix in the help."""
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),

@@ -1,4 +1,4 @@
-"""PETSc's options before PETSc starts: words of the command line, options files, checks of values."""
+"""Read PETSc's options from the command line and from files before PETSc starts, and check their values."""
 
 import math
 import os
@@ -35,7 +35,7 @@ def can_be_written(file: str) -> bool:
     except FileNotFoundError:
         folder = os.path.dirname(os.path.realpath(file))
         return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)
-    except OSError:  # too long a name, a file for a folder, links in a circle
+    except OSError:  # the name is too long, a folder is a file, or links form a circle
         return False
     if stat.S_ISFIFO(kind):
         try:
@@ -68,7 +68,7 @@ def flag_value(value: Value) -> str | None:
 
 
 def is_flag(name: str) -> bool:
-    """Return whether an option (name without dash) is a flag; a flag needs no value, but may have a viewer."""
+    """Return whether an option (name without dash) is a flag, which needs no value; see also `is_viewer`."""
     return name in FLAGS or is_viewer(name) or (name.startswith("feti_") and SHOWING.search(name) is not None)
 
 
@@ -116,7 +116,7 @@ def _is_place(text: str) -> bool:
 
 
 def _words_of(file: str) -> list[str]:
-    """Return the words of an options file; [] if it is unreadable, or has more than PETSc's options."""
+    """Return the words of an options file; [] if it is unreadable, or does not contain PETSc's options alone."""
     try:
         lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
     except (OSError, ValueError):  # ValueError: the name has a null character
@@ -173,7 +173,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
             name = word[1:]
         else:
             is_flag_value = _is_switch(word) or VIEWER.fullmatch(word) is not None
-            # No value, valid or invalid, is a case file; no value of a flag is a path.
+            # A case file is never a value, and a path is never the value of a flag.
             is_path = not is_flag_value and (os.sep in word or os.path.exists(word))
             is_ours = re.match("--|-h$", word) or (word.endswith(CASE_FILE) and name != "options_file")
             (petsc if name and not is_ours and not (is_flag(name) and is_path) else ours).append(word)

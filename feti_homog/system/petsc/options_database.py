@@ -1,4 +1,4 @@
-"""PETSc's options for one run: the command line overrides the case, and no option is ignored silently."""
+"""Set PETSc's options for one run: the command line overrides the case, and no option is ignored silently."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

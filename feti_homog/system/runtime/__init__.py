@@ -1,4 +1,4 @@
-"""The process: memory, progress, locks of files, signals, standard streams; records for documents.
+"""The process: memory, progress, file locks, signals, standard streams; records for documents.
 
 Imports nothing.  Main entries: `standard_streams.Progress`, `file_locks`, `input_files`.
 """

@@ -1,4 +1,4 @@
-"""Locks between processes on machines that share a file system, and files that are removed when a process ends.
+"""Lock files between processes on machines that share a file system, and remove files when a process ends.
 
 The system releases a lock whenever its process ends, even by SIGKILL.
 """
@@ -15,7 +15,7 @@ from typing import Self
 
 from feti_homog.errors import FetiHomogError
 
-# Seconds for which a lock is tried: a process that only asks for the holder has the lock for a moment.
+# Seconds for which a lock is tried: a process that only asks for the holder takes the lock for a moment.
 LOCK_TIMEOUT_S = 0.2
 # Errors of the system if another process has the lock, and if the file system has no locks.
 HELD = (errno.EAGAIN, errno.EACCES)
@@ -26,7 +26,7 @@ files: set[Path] = set()
 
 
 class LockHeld(Exception):
-    """Another process holds the lock; the text names it."""
+    """Another process holds the lock; the text names this process."""
 
 
 class LocksUnsupported(FetiHomogError):
@@ -118,7 +118,7 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Return the name of the process with the exclusive lock, as `this_process`; None without a lock."""
+    """Return the name (see `this_process`) of the process with the exclusive lock; None without a lock."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None

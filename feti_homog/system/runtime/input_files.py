@@ -1,4 +1,4 @@
-"""Reading of files that users name: regular files of bounded size, no pipes or devices, which may never end.
+"""Read files that users name: regular files of bounded size, not pipes or devices, which may never end.
 
 A library that may crash on a damaged file reads the file in a separate process.
 """
@@ -45,7 +45,7 @@ def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
     """Return the content of a file; see `opened`.
 
     Raises:
-        OSError: as `opened`, and for a file with more than `most` bytes.
+        OSError: as in `opened`, and if a file has more than `most` bytes.
     """
     with opened(path, pipes) as stream:
         size = os.fstat(stream.fileno()).st_size  # 0 for pipes
@@ -65,7 +65,7 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    The child ends with this process, or after `seconds` of the processor, by default proportional to the file size.
+    The child ends with this process, or after `seconds` of processor time, which by default grow with the file size.
 
     Raises:
         FetiHomogError: the function raises it.
@@ -82,7 +82,7 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
         for number in (signal.SIGINT, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: it ends with its parent
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: the child ends with its parent
         addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
         for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
             limits = resource.getrlimit(kind)

@@ -65,7 +65,7 @@ def peak_memory() -> int:
 
 
 class _Heap(ctypes.Structure):
-    """The structure of mallinfo2(3): counts of glibc about its memory."""
+    """The structure of mallinfo2(3): glibc's counts of its memory."""
 
     _fields_ = tuple((f"field_{k}", ctypes.c_size_t) for k in range(10))
 

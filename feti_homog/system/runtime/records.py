@@ -1,4 +1,4 @@
-"""Records: dataclasses whose fields have descriptions (meaning, unit, names in files).
+"""Describe the fields of records, which are dataclasses, by meaning, unit and names in files.
 
 Writers of files and the reference tables of the manual take names and types from the descriptions.  Fields without a
 description are not written.
@@ -25,7 +25,7 @@ class Description:
     Attributes:
         meaning: meaning in words.
         unit: unit, empty for pure numbers, counts and strings.
-        shape: shape of an array, as "(3, 3)" or "(n, 2)"; empty for other values.
+        shape: shape of an array, such as "(3, 3)" or "(n, 2)"; empty for other values.
         components: names of the columns that an array fills in a table.
         spatial_components: `components` in generalized plane strain, if they differ.
         entries: keys of a mapping and their meanings; a single key in capitals stands for any key.

@@ -1,4 +1,4 @@
-"""Standard output and error (a failed write does not stop a run), progress, and signals that end the process.
+"""Print output and errors (a failed write does not stop a run), show progress, and end the process after signals.
 
 After Ctrl-C, or a signal from a launcher or batch system, the process prints one line and ends at once.  Python runs
 signal handlers only between bytecodes, so a mesher or a factorization may delay them for a long time; libraries
@@ -89,7 +89,7 @@ def print_product(text: str) -> None:
     """Print the product of a command, such as a table.
 
     Raises:
-        FetiHomogError: standard output cannot be written, except where the reader of a pipe has left.
+        FetiHomogError: standard output cannot be written; no error if the reader of a pipe has left.
     """
     try:
         print(escaped(text, KEPT), flush=True)
@@ -134,7 +134,7 @@ class Progress:
     def stage(self, name: str) -> Iterator[list[str]]:
         """Time a block as a stage of the run and of PETSc's log, and print its time.
 
-        The block may append remarks to the list, which are printed with the time, less the times of inner stages.
+        The block may append remarks to the list, which are printed with the time.  This time excludes inner stages.
         """
         from petsc4py import PETSc
 
