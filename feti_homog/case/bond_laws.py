@@ -14,7 +14,7 @@ class BondLawEntry:
     Attributes:
         name: value of [interface] law or criterion.
         implementation: "module.Class".
-        keys: keys of [interface] that only some laws have, and this law has.
+        keys: keys of [interface] that this law has, but not all other laws.
         needs: keys that this law requires.
         limits: keys, one of which must be finite for bonds to break; empty if the law always has a limit.
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.

@@ -104,7 +104,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """Return the first interface, which has the common contact, criterion and growth."""
+        """Return the first interface; all interfaces share its contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
@@ -116,8 +116,8 @@ class Case:
     def targets(self) -> tuple[Mapping[str, float], ...]:
         """Return the loads of the case with all components.
 
-        A load maps names to values: the strain or stress of each component, in Voigt order; in generalized plane
-        strain then the temperature. The unloaded start of a path is left out.
+        A load maps names to values: the strain or stress of each component in Voigt order and, in generalized plane
+        strain, the temperature.  The unloaded start of a path is left out.
         """
         return completed(tuple(self.section.placed.values()), self.analysis.plane)
 

@@ -1,6 +1,6 @@
-"""Polynomial fits to the element values around every vertex, by least squares weighted with areas.
+"""Fit polynomials to the element values around every vertex, by least squares weighted with areas.
 
-A boundary vertex has elements on one side only, so that known tractions correct its fit.
+A boundary vertex has elements on one side only, so known tractions correct its fit.
 """
 
 from __future__ import annotations
@@ -167,8 +167,8 @@ class KnownTractions:
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
         """Change the stresses (vertices, m, k) at n vertices to match the known tractions.
 
-        With d = traction - sigma n, the result in the plane is sigma + d n + n d - (d . n) n n + a t t, where a keeps
-        the strain along the boundary, which both sides have in common; along the fibres the result is sigma + d n.
+        With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
+        where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.
         `voigt` (c, 2) has the component numbers, and the flexibility is (m, m).
         """
         n, before = self.normal, stress[vertex]

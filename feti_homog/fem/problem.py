@@ -1,4 +1,4 @@
-"""Unknowns on the plane mesh: displacements, displacement strains and unit loads.
+"""Define the unknowns on the plane mesh: displacements, displacement strains and unit loads.
 
 With long fibres, strains do not vary along x3, and the plane x3 = 0 is a plane of symmetry of every phase.  Then the
 displacements in the plane and along x3 have separate problems: generalized plane strain and axial shear.
@@ -28,7 +28,7 @@ class Problem:
 
     @property
     def components(self) -> int:
-        """Return the number c of displacements of a node."""
+        """Return the number c of displacements at a node."""
         return len(self.strain)
 
     @property

@@ -1,9 +1,9 @@
-"""Shape functions of linear and quadratic triangles, with gradients at the quadrature points, and mixed elements.
+"""Evaluate shape functions of linear and quadratic triangles, their gradients at quadrature points, and mixed elements.
 
 Mixed elements are quadratic triangles with a cubic bubble and a discontinuous linear pressure (Crouzeix and Raviart
 1973).  The pressure is p = lambda Pi div u, where Pi projects on linear functions in reference coordinates.  Pressure
 and bubble are eliminated element by element, so that the element has the nodes of a quadratic triangle.  It does not
-lock where lambda exceeds the shear modulus mu.  Mean strains, mean stresses and loads under uniform strains equal the
+lock if lambda far exceeds the shear modulus mu.  Mean strains, mean stresses and loads under uniform strains equal the
 values of the quadratic triangle, because the bubble vanishes on the boundary and Pi keeps means.
 """
 

@@ -1,4 +1,4 @@
-"""Recovered stresses in the subdomains, and the energy of their difference from the element stresses.
+"""Recover stresses in the subdomains, and compute the energy of their difference from the element stresses.
 
 After Zienkiewicz and Zhu (IJNME 33 (1992) 1331), a polynomial of the element order is fitted about every vertex to the
 stresses at the integration points of the surrounding elements.  Barycentric coordinates blend the three vertex fits of
@@ -68,7 +68,7 @@ class RecoveredStress:
     def on(
         cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """Set up the stress recovery on one mesh; arguments are as the attributes."""
+        """Set up the stress recovery on one mesh; arguments are like the attributes."""
         return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property

@@ -81,7 +81,7 @@ class TransverseIsotropy:
 
 @dataclass(frozen=True)
 class TransverseModuli:
-    """Range of moduli across the fibres, over 720 directions in half a turn about x3."""
+    """Ranges of the moduli across the fibres, over 720 directions in half a turn about x3."""
 
     E_least: float = described("least Young's modulus across the fibres", records.STRESS)
     E_largest: float = described("largest Young's modulus across the fibres", records.STRESS)
@@ -122,11 +122,11 @@ def _along_axes(S: Array) -> dict[str, Any]:
 def about_fibres(C: Array) -> dict[str, Any]:
     """Tabulate the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
 
-    The nearest one in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3: Hill's moduli
+    The nearest stiffness in the Frobenius norm is the mean of C and C^T over all turns about x3, with Hill's moduli
 
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
-    where Cij is the mean of Cij and Cji: between nearly incompressible phases the rounding of C12 - C21 is not small
+    where Cij means (Cij + Cji)/2, because for nearly incompressible phases the rounding of C12 - C21 is not small
     beside m.  The moduli are equal in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
     G_transverse = m, K_transverse = k (Hill 1964).
     """
@@ -149,7 +149,7 @@ def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: fl
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli of a plane stiffness (3, 3).  Raises numpy.linalg.LinAlgError if C is singular."""
+    """Return the moduli of a plane stiffness (3, 3).  Raises numpy.linalg.LinAlgError if it is singular."""
     C = np.asarray(stiffness, dtype=float)
     S, (bulk, shear) = np.linalg.inv(C), isotropic_part(C)
     table = _along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
@@ -187,7 +187,7 @@ def _distance(C: Float, nearest: Float) -> float:
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """Return the constants of a spatial stiffness (6, 6).  Raises numpy.linalg.LinAlgError if C is singular."""
+    """Return the constants of a spatial stiffness (6, 6).  Raises numpy.linalg.LinAlgError if it is singular."""
     table = _along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
     return EngineeringConstants(**{name: float(value) for name, value in table.items()})
 
@@ -229,8 +229,8 @@ def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
     """Return the ranges of the moduli E and G over the directions n across x3.
 
-    1/E = sigma:S:sigma with sigma = n n; 1/G with sigma = n t + t n, where t is normal to n and x3.
-    Raises numpy.linalg.LinAlgError if C is singular.
+    1/E = sigma:S:sigma with sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to n and x3.
+    Raises numpy.linalg.LinAlgError if the stiffness is singular.
     """
     angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     c, s, zero = np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)

@@ -21,7 +21,7 @@ MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
     """Estimate the constants of fibres in a matrix by each method.
 
-    The rule of mixtures and Mori and Tanaka's estimate hold for any kinds of fibres, the other methods for one kind;
+    The rule of mixtures and Mori and Tanaka's estimate hold for several kinds of fibres, the other methods for one;
     only the last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic
     about x3, nor an expansion if a phase has no expansion.
     """
@@ -127,9 +127,9 @@ def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants by `cylinders_in_matrix`: every fibre alone in the matrix, under its mean field.
+    """Estimate the constants by `cylinders_in_matrix`: each fibre alone, under the mean field of the matrix.
 
-    The method allows any kinds of round fibres, also on springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
+    The method allows several kinds of round fibres and springs.  Mori and Tanaka 1973, Benveniste 1987; transversely
     isotropic phases: Chen, Dvorak and Benveniste 1992; springs: Benveniste 1985.
     """
     return Estimate.of(cylinders_in_matrix(matrix, fibres))
@@ -138,7 +138,7 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Estimate the constants of similar cylinders that fill space, for one kind of fibres, also on springs.
 
-    Each cylinder is a fibre in matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and the expansions are exact for
+    Each cylinder is a fibre coated by matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and expansions are exact for
     this arrangement; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin
     1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """

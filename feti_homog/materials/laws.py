@@ -27,7 +27,7 @@ NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
 }
 """Optional constants that each plane state needs."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
-# Relative rounding in the constants and the stiffness of an isotropic, or transversely isotropic, material.
+# Relative deviation, by rounding, up to which a material counts as isotropic or transversely isotropic.
 ISOTROPY = 1e-9
 # Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.
 NOISE = 1e-9
@@ -186,7 +186,7 @@ def _angle(material: material_forms.Material) -> float:
 
 
 def _checked_stiffness(material: material_forms.General) -> Float:
-    """Check and return the given stiffness of a phase, (3, 3) or (6, 6)."""
+    """Check and return the given stiffness of a phase, (3, 3) or (6, 6).  Raises ValueError."""
     stiffness = _symmetric("stiffness", material.stiffness)
     noise = NOISE * np.abs(stiffness).max()
     if len(stiffness) == 6:
@@ -215,7 +215,7 @@ def _positive_definite(name: str, matrix: Float) -> Float:
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Check and return the compliance (6, 6) in material axes, for a plane state."""
+    """Return the compliance (6, 6) in material axes; ValueError if unstable, or incomplete for the plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):

@@ -1,4 +1,4 @@
-"""Differentiate phase laws by their constants, and composite constants by the stiffness.
+"""Differentiate phase laws with respect to their constants, and composite constants with respect to the stiffness.
 
 Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as in `laws.stiffness_of`.  Functions without
 absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) / h, which is exact to rounding (Squire
@@ -20,7 +20,7 @@ from feti_homog.typing import Float
 
 STEP = 1e-30  # the square vanishes beside 1 in rounding
 ISOTROPIC_COMPLIANCE = {"E_axial": "young", "E_transverse": "young", "nu_axial": "poisson", "nu_transverse": "poisson"}
-# Derivative of `strain_rotation` by the angle in degrees, at 0.
+# Derivative of `strain_rotation` with respect to the angle in degrees, at 0.
 TURN = np.zeros((6, 6))
 TURN[IN_PLANE_BLOCK] = [[0, 0, 1], [0, 0, -1], [-2, 2, 0]]
 TURN[3:5, 3:5] = [[0, -1], [1, 0]]
@@ -83,7 +83,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
         if isinstance(varied, material_forms.Isotropic):
             named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
             varied = material_forms.TransverselyIsotropic(**named, G_axial=varied.young / (2 * (1 + varied.poisson)))
-        with np.errstate(invalid="ignore"):  # NaN where the constants leave the compliance open
+        with np.errstate(invalid="ignore"):  # NaN where constants do not determine the compliance
             changed = _of_plane_state(known_compliance(varied), plane, condensed="strain")
         yield name, value, -C @ turn @ changed @ turn.T @ C
 

@@ -1,4 +1,4 @@
-"""The forms in which a section [material.PHASE] gives the constants of a linear elastic phase, and its strength.
+"""Define the forms in which a section [material.PHASE] gives the constants and the strength of an elastic phase.
 
 The utilisation of a strength is 1 at failure, and proportional to the stress.  Criteria: maximum principal stress
 sigma_1 / X; von Mises; Drucker and Prager, fitted to both uniaxial strengths; for fibres along x3 the largest of
@@ -35,7 +35,7 @@ EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 class PhaseStrength:
     """Strength of a phase by one criterion.
 
-    Its keys are principal; von_mises; tension and compression; or the six of Hashin for fibres along x3.
+    The keys are principal, or von_mises, or tension and compression, or Hashin's six for fibres along x3.
     """
 
     principal: float | None = stress("Largest principal stress.", default=None)
@@ -186,7 +186,7 @@ CRITERIA = {
     ),
 }  # fmt: skip
 """Criteria with the keys that each criterion needs."""
-MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")  # of Hashin
+MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")  # of Hashin's criterion
 
 
 def criterion(strength: PhaseStrength) -> str:

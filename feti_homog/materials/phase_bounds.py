@@ -135,7 +135,7 @@ class ConductivityEstimates:
 
 
 def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
-    """Return 1 / sum c/(p + p0) - p0 of cylinders p in a medium p0 under equal far fields."""
+    """Return 1 / sum c/(p + p0) - p0 for cylinders with moduli p in a medium with p0, under equal far fields."""
     return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
 
 
@@ -155,7 +155,7 @@ def is_isotropic(stiffness: ArrayLike) -> bool:
 
 
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
-    """Bound the moduli of an isotropic composite of isotropic phases, (n,) and (n, 3, 3), in the plane.
+    """Bound the plane moduli of an isotropic composite from fractions (n,) and isotropic stiffnesses (n, 3, 3).
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
@@ -263,8 +263,8 @@ def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy
     """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
     The bounds are `aligned_cylinders` in a medium with the least, or the greatest, moduli of the phases.  Hill's
-    relation at the bounds on k gives the bounds on nu_A, for two phases only.  All bounds except those on G_T also
-    hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
+    relation at the bounds on k gives the bounds on nu_A, for two phases only.  All bounds except the bounds on G_T
+    also hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
     """
 
     def extreme(pick: Callable[[Iterable[float]], float]) -> tuple[float, float, float]:
