@@ -185,7 +185,7 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own
     try:
         libraries.start_petsc([sys.argv[0], *option_values.petsc_words(options)], comm)
-    except RuntimeError as error:  # raised by petsc4py before PETSc can name it
+    except RuntimeError as error:  # petsc4py raises it before PETSc can name the fault
         raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
 

@@ -35,7 +35,7 @@ def _command(words: Sequence[str], comm: Intracomm) -> int:
     from petsc4py import PETSc
 
     commands = parser.command_parser()
-    # PETSc would take our own options with a single dash without a word.
+    # PETSc would silently accept our own options with a single dash.
     actions = next(action.choices for action in commands._actions if isinstance(action, argparse._SubParsersAction))
     ours = {name[2:] for action in actions.values() for name in action._option_string_actions if name.startswith("--")}
     if misplaced := sorted(ours & PETSc.Options().getAll().keys() - {"help"}):

@@ -34,7 +34,7 @@ class FetiHomogError(Exception):
     def __init__(self, *faults: str) -> None:
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]
-        room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # one more fault, or a line with its count
+        room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # the last fault, or a line with the count
         more, end = sum(counts.values()) + max(len(lines) - room, 0), LONGEST_LINE - KEPT_END - 3
         lines[room:] = [f"and {more} more faults"] if more else []
         # The reason stands at the end of a line.
@@ -72,6 +72,6 @@ class NoMemoryError(FetiHomogError):
 
 
 class LibraryError(FetiHomogError):
-    """A library that pip does not bring is missing or does not fit; each fault gives the remedy."""
+    """A library that pip does not install is missing or does not fit; each fault gives the remedy."""
 
     exit_code = ExitCode.INPUT

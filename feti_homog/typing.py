@@ -1,4 +1,4 @@
-"""Aliases: NumPy's array types, whose shapes stand in docstrings, documents such as result.json, communicators."""
+"""Name types: NumPy arrays, whose shapes docstrings give, documents such as result.json, and communicators."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "pixels": IMAGE_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
-# Distance from a cut window / radius, up to which a centre outside counts as a centre on the border.
+# Distance outside a cut window / radius up to which a centre counts as a centre on the border.
 LEFT_OUT = 0.01
 
 
@@ -55,7 +55,7 @@ def missing(file: Path) -> str:
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Read the window that a random cell matches, and append faults to `faults`.
 
-    Where the cell gives no fibre count or no fibre fraction, the window provides the value.
+    If the cell gives no fibre count or no fibre fraction, the window provides the value.
     """
     if cell.match is None:
         return cell
@@ -80,7 +80,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Read the fibre table of a cell, which gives the cell size."""
+    """Read the fibre table of a cell, with the cell size, and append faults to `faults`."""
     from feti_homog.microstructure import fibre_table  # which few cases need
     from feti_homog.microstructure.shapes import shapes
 

@@ -18,7 +18,7 @@ from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
 """Largest Poisson's ratio of linear triangles; above it they lock."""
-# Poisson's ratio above which rounding brings checks to their tolerance. At 0.4999999, with fibres a thousandth as stiff
+# Poisson's ratio above which rounding may fail the checks. At 0.4999999, with fibres a thousandth as stiff
 # as the matrix, iterative refinement lowers the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999
 
@@ -57,7 +57,7 @@ CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
 """Keys that the key `accuracy` determines, and therefore excludes."""
 
 # By element order, the error of the coarsest mesh with stiff inclusions / (kappa beta^2), and the factor by which soft
-# inclusions raise it: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
+# inclusions raise this error: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
 # Upper bound of kappa s in cells with mixed elements alone.

@@ -113,7 +113,7 @@ class AnalysisSection:
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Return the successive openings of all arcs; empty if each arc has its angle."""
+        """Return the successive openings of all arcs; empty if each arc has its own angle."""
         return ()
 
     @property

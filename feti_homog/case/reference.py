@@ -88,10 +88,10 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
     """Return the key tables: all in `ORDER`, one section, or all with a word.
 
-    The search ignores case, and takes underscores for spaces, in names and descriptions of keys and sections.
+    The search covers names and descriptions of keys and sections; it ignores case, and treats underscores as spaces.
 
     Raises:
-        CaseError: nothing has the word, and no lines of `results` describe it.
+        CaseError: no key or section has the word, and `results`, the lines on results with the word, is empty.
     """
     ranges, measured = _rows(sections.SWEEP, sections.RANGE_KEYS), f"[{sections.MEASURED}]"
     references = [

@@ -16,10 +16,10 @@ from feti_homog.schema import TableReader, keys, types, wording
 
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
 SAME = 1e-6
-# Largest ratio of toughness to the energy at the peak: beyond, 1 - d has less than three digits for a damage d near 1.
+# Largest ratio of toughness to the energy at the peak: beyond, 1 - d has fewer than three digits for a damage d near 1.
 MOST_BRITTLE = 1e12
 COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if not entry.by_pair)
-"""Keys with one value for all interfaces: every [[interface]] section must repeat it."""
+"""Keys with one value for all interfaces: every [[interface]] section must repeat this value."""
 
 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
@@ -147,7 +147,7 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of an interface section: softening numbers, too small a toughness, and friction.
+    """Yield the faults of an interface section: softening numbers, toughnesses out of range, and friction.
 
     `table` is the section as in the file; a separate rule reports its missing keys.
     """
@@ -180,7 +180,7 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """List the friction keys without effect at zero friction, in one line each."""
+    """List the friction keys without effect at zero friction, one per line."""
     idle = [label for label, each in labelled(interfaces) if each.friction_on_damage and each.friction == 0.0]
     return [f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle]
 

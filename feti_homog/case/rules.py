@@ -1,4 +1,4 @@
-"""Relations between keys in a case file: requirements, exclusions, and the lines of their faults."""
+"""Define relations between keys in a case file: requirements, exclusions, and the lines of their faults."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -42,7 +42,7 @@ class Rule:
         holds: tests the value; None if the path may have no value.
         words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
-        names: keys in the fault, reduced to those in the table if the table has any; empty: the fault shows the value.
+        names: keys in the fault, without keys that the table lacks unless it lacks all; empty: the fault has the value.
     """
 
     path: TablePath
@@ -92,7 +92,7 @@ def needed(
 ) -> Rule:
     """Return the rule that a table has a key, or one of its substitutes.
 
-    The rule applies under the conditions `when`, and, if `beside` is given, only to tables with that key.
+    The rule applies under the conditions `when` and, if a key `beside` is given, only to tables with this key.
     """
 
     def holds(table: Any) -> bool:
@@ -248,7 +248,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test, or is missing or no table, which other rules report."""
+    """Return whether an [interface] section passes a test; true without sections, or if one is not a table."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 

@@ -31,7 +31,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     try:
         content = input_files.read(path, types.MOST_BYTES, pipes=True).decode("utf-8-sig")
         if DEEP_KEY.search(content):
-            raise RecursionError  # tomllib would take time in the square of the length
+            raise RecursionError  # tomllib would take time proportional to the length squared
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -61,7 +61,7 @@ def to_document(values: object) -> dict[str, Any]:
 
     Raises:
         TypeError: the values are not a mapping.
-        CaseError: a key is not a string, an integer is too large for messages, or tables are long, deep or circular.
+        CaseError: a key is not a string, an integer is too large for messages, or a table is too long or too deep.
     """
     if not isinstance(values, Mapping):
         raise TypeError(

@@ -1,4 +1,4 @@
-"""Reading of case file tables into frozen dataclasses, whose fields have the rules of their keys."""
+"""Read case file tables into frozen dataclasses, whose fields have the rules of their keys."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The types of values in a case file: description, test and stored form; limits of files and lists.
 
-Limits of entries let the program check each case file or table in less than ten seconds.
+The limits let the program check each case file or table in less than ten seconds.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The wording of messages about a case: values and keys as in TOML, hints for unknown names."""
+"""Word messages about a case: values and keys as in TOML, and hints for unknown names."""
 
 import difflib
 import json
