@@ -140,7 +140,7 @@ def mesh_error(
     """Return the `Result` entry `mesh_error`, or nothing without estimated errors.  Collective.
 
     The error of a constant f(C) is max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes an energy error above
-    the accuracy of the case and constants outside their bounds.
+    the accuracy of the case, and constants outside their bounds.
 
     Args:
         secants: `effective_stiffness` and the entries that follow from it, as in `Result`.

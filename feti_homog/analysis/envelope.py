@@ -166,7 +166,7 @@ class _Finder:
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
         """Return the first break on each ray as a row.  Collective.
 
-        A row has the least factor, then fibre, interface and direction of the bond, and the law's numbers of the break.
+        A row has the least factor; fibre, interface and direction of the bond; and the law's numbers for the break.
         Ties: lowest fibre, then interface, then direction.
 
         Args:

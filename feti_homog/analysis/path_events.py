@@ -110,7 +110,7 @@ def restored(
 ) -> tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]]]:
     """Rebuild a path point, the energies up to this point, and its most utilised bond from an event.
 
-    Arrays beyond the room of the checkpoint are empty; `found_again` computes them.
+    Arrays for which the checkpoint had no room are empty; `found_again` computes them.
     """
     states = list[Equilibrium]()
     for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
@@ -285,7 +285,7 @@ def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping
         holds &= bool((is_known & ~heals).all())
     try:
         context.plane.damage(states[-1])
-    except IndexError:  # of a tooth beyond the last
+    except IndexError:  # a tooth beyond the last
         return -1
     return int((states[-1].status != BONDED).sum() - (before.status != BONDED).sum()) if holds else -1
 

@@ -39,7 +39,7 @@ def run(
     `resume` continues from the checkpoint, or reads the finished result; `keep_fields` adds the fields.
 
     Raises:
-        CaseError, MeshError: before any result is written; also if the checkpoint is another run's, or the folder used.
+        CaseError, MeshError: before any result is written; also for another run's checkpoint or a folder in use.
         ConvergenceError: after the result has been written and marked.
     """
     comm = progress.comm

@@ -42,7 +42,7 @@ class Rule:
         holds: tests the value; None if the path may have no value.
         words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
-        names: keys in the fault, without keys that the table lacks unless it lacks all; empty: the fault has the value.
+        names: keys in the fault, only keys in the table if the table has any of them; empty: the fault shows the value.
     """
 
     path: TablePath

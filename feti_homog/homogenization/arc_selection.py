@@ -16,8 +16,8 @@ from feti_homog.mesh.outline import outline
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# The singular stress at a tip causes an energy error proportional to the element size there; elsewhere the order is
-# h^(2 order). At this fraction of the size that balances both, tips add little (`scripts/measure_tips.py`).
+# The singular stress at a tip causes an energy error proportional to the element size there; elsewhere the error is
+# O(h^(2 order)). At this fraction of the size that balances both errors, tips add little (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
 # Largest default ratio of the triangles that tips add to the triangles of a mesh for several openings.
 TIP_TRIANGLES = 2.0

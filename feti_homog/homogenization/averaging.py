@@ -45,7 +45,7 @@ class Response:
             least stress that the strains cause in a bonded cell.  The errors of the contact certificate (KKT) follow.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
-        shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None without estimate.
+        shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
     """
 
     strain: Float

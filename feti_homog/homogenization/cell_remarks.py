@@ -25,7 +25,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     """Return the interface number (phases, phases) of each pair of phases.
 
     The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
-    matrix, the first phase, and all other phases.
+    matrix (the first phase) and all other phases.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -56,7 +56,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
     """List remarks on a mesh, interfaces without effect or with soft springs, and nodes that never part.
 
-    `pairs` as in `pairs_of`, `radii` as in `soft_springs`.
+    `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:

@@ -1,4 +1,4 @@
-"""Energy release rate G = -d(energy) / d(debonded length) at tips, at constant strain.
+"""Compute the energy release rate G = -d(energy) / d(debonded length) at tips, at constant strain.
 
 For rigid bonds G follows from a virtual crack extension, with an error like the energy error on any mesh.  The nodes
 around the tip, and the displacements of these nodes, turn about the fibre centre by an angle s q; q is 1 near the tip

@@ -23,7 +23,7 @@ from feti_homog.typing import Float, Int
 ELEMENTS_AT_ONCE = 1 << 13
 # Number of halvings from which a mesh with two fewer gives the error, except across materials and if a phase locks.
 REFINED_OFTEN = 3
-# Largest lambda / mu on that mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
+# Largest lambda / mu on such a mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
 # coarse elements lock, and their errors say little about the fine mesh.
 LOCKING = 4.0
 # Position of a displacement that is not on a boundary: the last position, where the displacement is zero.
