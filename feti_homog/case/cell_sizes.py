@@ -29,7 +29,7 @@ def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases so close to incompressible that rounding errors dominate, one per line."""
+    """List the phases so close to incompressible that rounding may fail the checks, one per line."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
@@ -77,8 +77,8 @@ def sized(
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
     `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Faults are added to
-    `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The size of the coarsest mesh is half
-    the distance between as many fibres on a square lattice, to two digits, and at most half the width: circles and
+    `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The coarsest elements have half the
+    fibre distance of a square lattice with as many fibres, to two digits, and at most half the width: circles and
     gaps have smaller elements, so that coarser meshes would hardly have fewer elements.
 
     Args:

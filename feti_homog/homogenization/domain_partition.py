@@ -35,7 +35,7 @@ class CellSummary:
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance by which a node in a user's mesh was moved to make opposite sides match.
         origin: lower left corner of the cell in the user's coordinates; all other positions are relative to the corner.
-        voids: number of voids.
+        voids, moved_tips: number of voids; for each interface, the tips that the mesher moved.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.

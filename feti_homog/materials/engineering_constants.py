@@ -92,7 +92,7 @@ class TransverseModuli:
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     """Tabulate the constants of a stiffness C, real or complex, by name.
 
-    The table has the entries Cij of the upper half, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with S = C^-1;
+    The table has Cij of the upper triangle, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with S = C^-1;
     in space also the nearest transversely isotropic constants (`about_fibres`) and, from the stress `heat` (6,) under a
     unit temperature, normal thermal stresses and strains.  Raises numpy.linalg.LinAlgError if C is singular.
     """

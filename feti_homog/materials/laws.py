@@ -37,7 +37,7 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: material_forms.Material, plane: str) -> Float:
-    """Return the stiffness (3, 3) in the plane, (6, 6) if the plane state is spatial, or `conductivity`.
+    """Return the stiffness: (3, 3) in the plane, (6, 6) in a spatial plane state; in conduction, `conductivity`.
 
     Raises like `plane_stiffness`.
     """

@@ -1,4 +1,4 @@
-"""The types of values in a case file: description, test and stored form; limits of files and lists.
+"""Define the types of values in a case file (description, test, stored form), and limits of files and lists.
 
 The limits let the program check each case file or table in less than ten seconds.
 """

@@ -1,4 +1,4 @@
-"""Import the libraries that need one common MPI, which pip does not install, and start PETSc."""
+"""Import the libraries that share one MPI and that pip does not install, and start PETSc."""
 
 import atexit
 import importlib

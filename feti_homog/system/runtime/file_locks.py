@@ -26,7 +26,7 @@ files: set[Path] = set()
 
 
 class LockHeld(Exception):
-    """Another process holds the lock; the text names this process."""
+    """Another process holds the lock; the text names the holder."""
 
 
 class LocksUnsupported(FetiHomogError):

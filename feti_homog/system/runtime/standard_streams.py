@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # SIGXCPU: the limit of CPU time
 # Variables with the rank of a process, which launchers set before MPI starts.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
-# Seconds that other ranks wait for the message of rank 0: Open MPI drops it after the end of another rank.
+# Seconds that other ranks wait for the message of rank 0: Open MPI drops this message once another rank has ended.
 SILENT_SECONDS = 5.0
 remarks = list[str]()  # lines that rank 0 prints if a signal ends the process
 KEPT = "\n\t"  # characters that are printed although they are not printable; others, from files, are escaped
