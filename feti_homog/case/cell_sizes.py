@@ -1,4 +1,4 @@
-"""Derive numbers of fibres and voids, cell width, element order and element size from a cell section.
+"""Derive fibre counts, cell width, element order and element size from a cell section.
 
 Each fibre phase has a fraction, `mix`, and a radius, `radii`.  If the cell gives an accuracy, element order and size
 follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
