@@ -92,7 +92,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) 
         except BaseException as met:
             line = f"rounding leaves a matrix singular: stiffnesses differ by too much ({met})"
             error = ConvergenceError(line) if isinstance(met, np.linalg.LinAlgError) else met
-            if cell and mpi_errors.all_raise(comm, error):  # destroy is collective, and ranks without an error go on
+            if cell and mpi_errors.all_raise(comm, error):  # destroy is collective; a rank without an error would go on
                 cell.destroy()
             raise error from (met.__cause__ if error is met else met)
         cell.destroy()

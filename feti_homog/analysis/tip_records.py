@@ -25,7 +25,7 @@ DIRECTION_DIGITS = 9
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     """Return the bond law of a cell.  Collective.
 
-    The law of released energies needs tips: debonding that `grows` creates tips, prescribed debonded faces have tips.
+    The law of released energies needs tips: debonding that `grows` creates them, prescribed debonded faces have them.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.

@@ -129,7 +129,7 @@ def _has(word: str, *texts: str) -> bool:
 
 
 def text(word: str = "", results: Sequence[str] = ()) -> str:
-    """Write the reference with an index of keys by need; with a word, its tables and the lines of `results`."""
+    """Write the reference with an index of keys by need; with a word, only tables with it and lines of `results`."""
     references = tables(word, results)
     if word:
         described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)

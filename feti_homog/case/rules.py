@@ -39,7 +39,7 @@ class Rule:
 
     Attributes:
         path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
-        holds: tests the value; None if the path may have no value.
+        holds: test of the value; None if the path must not have a value.
         words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
         names: keys in the fault, only keys in the table if the table has any of them; empty: the fault shows the value.

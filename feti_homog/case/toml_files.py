@@ -125,7 +125,7 @@ def with_values(
     """Return a copy of a document with other values at some paths.
 
     A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
-    of several sections or an entry of a list; Cij are both entries of a symmetric stiffness.  Faults, which begin with
+    of several sections or an entry of a list; Cij stands for both entries of a stiffness.  Faults, which begin with
     `place`, are appended to `faults`.
     """
     document = copy.deepcopy(dict(base))

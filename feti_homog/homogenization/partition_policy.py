@@ -56,7 +56,7 @@ class PartitionPolicy:
         even_cut_factor, even_share: `even_cut_factor` replaces `cut_factor` for bodies up to the fraction `even_share`
             of a rank's load: ranks balance such bodies without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
-            often that uncut bodies pay as long as their boundaries' dense matrices are small.
+            often that uncut bodies pay off while the dense matrices of their boundaries are small.
         tiles: rules for the tiles of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body; so are
             label images of any size, whose bodies have long boundaries; 0 for no such cuts.
@@ -130,7 +130,7 @@ def wanted_pieces(
         load: (b,) coarse triangles in each body.
         edges: (b,) coarse edges between each body and other bodies.
     """
-    # A coarse triangle brings about M^2 / 2 nodes.
+    # A coarse triangle adds about M^2 / 2 nodes.
     dofs_of_triangle = lattice.intervals**2
     if case.decomposition.max_dofs is not None:
         return partition.pieces_for_size(load, dofs_of_triangle, case.decomposition.max_dofs)
@@ -157,7 +157,7 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
     contact = touches and problem.turns  # in axial shear no faces touch
     bond = case.interface
     by_energy = bond is not None and bond.criterion in bond_laws.laws_with("growth") and bond.growth == "released"
-    # Envelopes with arcs need the inverse operator, which pays for many solves.
+    # Envelopes with arcs need the inverse operator, which pays off if there are many solves.
     many = case.section.is_followed or (has_arcs and case.section.breaks and by_energy)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
     has_coatings = phase_names.COATING in case.materials and not across

@@ -19,19 +19,19 @@ from feti_homog.errors import FetiHomogError
 
 SETTINGS = {
     "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
-    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four threads for any OMP_NUM_THREADS, which take half of its time
+    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four threads for any OMP_NUM_THREADS, and loses half of its time
     "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
     "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
 }
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
-# Bytes of stack for MPI, which does not start with a quarter of them; bytes of addresses for a small run on one rank.
+# Bytes of stack for MPI, which does not start with a quarter of this; bytes of addresses for a small run on one rank.
 STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
 def prepare_environment(environment: MutableMapping[str, str]) -> None:
-    """Set unset variables of SETTINGS; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
+    """Set the variables of SETTINGS that are not set; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)
