@@ -72,7 +72,7 @@ class FetiSolver:
     ) -> None:
         """Factor the subdomains and the coarse problem.  Collective.
 
-        `applications`, the expected number of products with F, `recovers` and exceptions are as in `solver_plan.build`.
+        The arguments `applications` and `recovers`, and the exceptions, are as in `solver_plan.build`.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = torn_stiffness E + d^T lam; for pulled sides also -int u* (x) n ds.  Collective."""
+        """Compute |UC| Sigma = torn_stiffness E + d^T lam; if `is_pulled`, also -int u* (x) n ds.  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and solution.alpha is not None:
             local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
@@ -182,7 +182,7 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return the loads (v + m, v) of unit strains: E, and with tractions the Sigma that keeps E the mean strain.
+        """Return the loads (v + m, v) of unit strains: E and, with tractions, the Sigma for which E is the mean strain.
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """
@@ -205,8 +205,8 @@ class FetiSolver:
         """Solve the dual problems for k loads together.  Collective.
 
         One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
-        With tractions on the sides, the solutions that gave `closure` are superposed.  With influence columns, raises
-        as `InfluenceSolutions.record`.
+        With tractions on the sides, the solutions that gave `closure` are superposed; raises like `closure`.  With
+        influence columns, raises like `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.

@@ -128,7 +128,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """The PETSc scatter between owned and local rows for k columns; without effect if both are equal."""
+    """The PETSc scatter between owned and local rows for k columns; no operation if these rows are equal."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))

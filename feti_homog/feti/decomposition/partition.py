@@ -1,4 +1,4 @@
-"""Partition of bodies into subdomains, and assignment of subdomains to ranks."""
+"""Partition bodies into subdomains, and assign the subdomains to ranks."""
 
 import heapq
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
-    The strips run along x or y, have about half of the triangles (within STRIP_SLACK), and their boundaries have as few
+    The strips run along x or y, with about half of the triangles each (within STRIP_SLACK), and with as few boundary
     edges as possible; boundaries of two METIS parts are up to 50 % longer.  Returns None if a strip is not connected.
     """
     tail, head, _ = torus.sides
@@ -77,7 +77,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     """Compute the subdomain (m,) of every triangle by METIS.
 
     Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.  METIS makes
-    short cuts, which cross narrow gaps instead of following them, so that the iteration converges faster.
+    short cuts, across narrow gaps instead of along them, with which the iteration converges faster.
 
     Args:
         parts: (m,) body of every triangle: `torus.constituent`, or `torus.plane_parts()`.
@@ -120,7 +120,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs a piece."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs per piece at most."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -139,10 +139,10 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """Assign subdomains with `load` (s,) triangles to ranks: (s,).
+    """Assign subdomains with `load` (s,) triangles to ranks; return the rank (s,) of every subdomain.
 
-    METIS keeps neighbours (left, right), one pair for every shared edge, on the same rank.  If its largest load exceeds
-    the largest balanced load by MAX_IMBALANCE, only loads decide.  Ranks stay empty if subdomains are too few.
+    METIS keeps neighbours (left, right), one pair per shared edge, together.  If a rank would stay empty, or get more
+    than MAX_IMBALANCE times the largest balanced load, only loads decide.  With too few subdomains, ranks stay empty.
     """
     by_load = distributed_arrays.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

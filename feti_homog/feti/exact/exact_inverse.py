@@ -5,7 +5,7 @@ since: their bonds broke, closed or softened.  `followed_response` updates the c
 every change.  With these columns, `reference_changes` turns any response of the reference cell into the present one.
 
 When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
-factored as the new reference cell.  The cell is factored too where an update would lose too many digits; columns are
+factored as the new reference cell.  The cell is also factored if an update would lose too many digits; columns are
 then followed from the new response.
 """
 
@@ -99,7 +99,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _restart(self) -> None:
-        """Factor the cell in its present state, and follow columns from its response.  Collective."""
+        """Factor the cell in its present state, and follow columns from the new response.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         nothing = np.zeros((self._rows, 0))
@@ -162,7 +162,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global rows (k,) if their asymmetry is at most `max_error`.  Collective."""
+        """Follow columns at global rows (k,); return False if their asymmetry exceeds `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))

@@ -14,9 +14,9 @@ with the other entries as above.  Springs of inactive rows have the initial comp
 a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs only the columns of
 I; changes of the other stored columns are collected, and applied when there are WAITING_COLUMNS of them.
 
-A row that becomes inactive and alone resisted a motion of a body becomes a pin.  A pin stays among the active rows
-with multiplier and jump 0, which fixes one of the possible positions of the body, until a row becomes active that
-resists the motion.
+If a row becomes inactive that alone resists a motion of a body, the row becomes a pin.  A pin stays among the active
+rows, with multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists
+the motion becomes active.
 """
 
 import numpy as np
@@ -150,7 +150,7 @@ class FollowedResponse:
         parts = np.array_split(softer, len(softer) // thresholds.WAITING_COLUMNS + 1)
         if not all(self.soften(rows[part], gains[part], pivot) for part in parts if len(part)):
             return False
-        # First rows become active, so that fewer bodies are free in between; half of the room is for pins.
+        # Rows become active first, so that fewer bodies are free in between; half of the room is for pins.
         moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(signs[moves], kind="stable")]
         for part in np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1) if len(moves) else []:
