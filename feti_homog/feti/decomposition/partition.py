@@ -106,7 +106,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Distribute `count` pieces (b,) over bodies with `load` (b,) triangles: divide the largest pieces first."""
+    """Choose piece counts (b,), in all `count`, for bodies with `load` (b,) triangles; large pieces divide first."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -131,7 +131,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into parts (n,) with even `load` (n,), or vertex counts, and a small edge cut."""
+    """Divide a graph by METIS into parts (n,) with a small edge cut and equal `load` (n,), or equal vertex counts."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

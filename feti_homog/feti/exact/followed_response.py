@@ -274,5 +274,5 @@ def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple
 
 
 def _has_digits(block: Float, pivot: float) -> bool:
-    """Return whether the singular values of `block` exceed `pivot`."""
+    """Return whether all singular values of `block` exceed `pivot`."""
     return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > pivot)

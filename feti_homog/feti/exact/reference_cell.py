@@ -121,7 +121,7 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
 
 
 class BodyTies:
-    """Two bonds that tie every fibre to the body around it: its first bond, and the bond farthest from it."""
+    """Two bonds that tie every fibre to the body around it: the first bond, and the bond farthest from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the two bonds of every pair of bodies.  Collective."""
@@ -264,7 +264,7 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 
 
 class BondedInverse(Preconditioner):
-    """The preconditioner z = H r, with the exact inverse H by a factored cell.
+    """The preconditioner z = H r, with the exact inverse H from a factored cell.
 
     Unlike `ExactInverse`, it factors the cell for every new set of active rows.
     """

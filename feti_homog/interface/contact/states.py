@@ -162,7 +162,7 @@ def kkt_errors(
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
     """Measure the violation (k,) of Coulomb's law.
 
-    The law is |t| <= mu p in stick, and t = s mu p in slip.  Shear along the fibres, without friction, violates it.
+    The law is |t| <= mu p in stick and t = s mu p in slip; along the fibres, without friction, any shear violates it.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

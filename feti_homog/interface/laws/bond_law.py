@@ -64,7 +64,7 @@ class BondLaw(ABC):
     Attributes:
         has_toughness: whether bonds have a fracture energy, see `fracture`.
         has_tips: whether results compare the fracture energy with the energy release rates at debonding tips.
-        is_convex: whether `share` is convex, so that the utilisation passes 1 once on a straight path.
+        is_convex: whether `share` is convex, so that the utilisation rises through 1 at most once on a straight path.
         break_names: column names in `breaks`, for tractions with two or three components.
     """
 
@@ -77,7 +77,7 @@ class BondLaw(ABC):
     def share(self, traction: Float) -> Float:
         """Return the utilisation (p,) of bonds under tractions (p, c); a bond breaks at 1.
 
-        The c components are normal, positive in tension, tangential and, if c = 3, along the fibre.  The utilisation is
+        The c components are normal (positive in tension), tangential and, if c = 3, axial.  The utilisation is
         homogeneous of degree one.
         """
 
@@ -96,7 +96,7 @@ class BondLaw(ABC):
         return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
-        """Return the internal variables (k, h) of `k` intact bonds."""
+        """Return the initial internal variables (k, h) of `k` intact bonds."""
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
