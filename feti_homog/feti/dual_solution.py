@@ -138,7 +138,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Complete a solution of the present state by F lambda, which gives alpha.
+        """Compute alpha, jumps and residual of a solution in the present state, by F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """

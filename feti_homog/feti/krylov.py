@@ -29,7 +29,7 @@ ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.
 
 
 class ProjectedProblem:
-    """The shell matrix P F and the shell preconditioner P H on the active rows; keeps the last residual r."""
+    """The context of the shell matrix P F and the shell preconditioner P H; it stores the last residual r."""
 
     def __init__(
         self, errors: c_functions.CallbackErrors, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int
@@ -167,7 +167,7 @@ class Krylov:
         """Solve P F lam = `right` for projected jumps `right` (rows, k), starting from `lam` (rows, k).  Collective.
 
         With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
-        so that only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
+        so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
         residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
         An exception in a product or the convergence test is raised again if it occurs on all ranks; else the job ends.

@@ -204,7 +204,7 @@ class FetiSolver:
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
         """Solve the dual problems for k loads together.  Collective.
 
-        One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
+        One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` reports convergence.
         With tractions on the sides, the solutions that gave `closure` are superposed; raises like `closure`.  With
         influence columns, raises like `InfluenceSolutions.record`.
 

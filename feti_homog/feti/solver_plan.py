@@ -113,7 +113,7 @@ class SolverPlan:
 
     Attributes:
         preconditioner: one of PRECONDITIONERS except "auto", or BONDED.
-        adaptive: whether the coarse space has soft modes beside rigid-body motions.
+        adaptive: whether the coarse space has soft modes in addition to rigid-body motions.
     """
 
     preconditioner: str

@@ -48,7 +48,7 @@ class Macroscopic:
 
     @property
     def stored(self) -> float:
-        """The stored energy E.Sigma / 2 per cell area."""
+        """The stored energy E.Sigma / 2, per cell area."""
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
@@ -146,7 +146,7 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return, for each node, the largest of the values (k,) on its interface, at least 0.  Collective."""
+        """Return the largest of `values` (k,) on the interface of every node, but at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -221,7 +221,7 @@ class LoadScales:
 def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains whose stresses are below the noise stay zero.
+    Strains that no stiffness resists stay zero if their stresses are below the noise.
 
     Raises:
         NotCarriedError: no stiffness resists the stresses.

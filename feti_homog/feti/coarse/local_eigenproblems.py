@@ -69,7 +69,7 @@ class SubdomainEigenproblem:
         self._share = BW @ (BW @ operator.S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield each neighbour, and this subdomain's part (r, r) of M^-1 on their r common rows."""
+        """Yield every neighbour s, and this subdomain's part (r, r) of M^-1 on r rows shared with s."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]

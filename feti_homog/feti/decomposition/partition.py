@@ -66,7 +66,7 @@ def halves(torus: Torus) -> Partition | None:
 
 
 def blocks(mesh: CoarseMesh, count: int) -> tuple[Int, Int]:
-    """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`."""
+    """Divide a mesh of square pixels into about `count` rectangles; return `parts` and `pieces` for `decompose`."""
     side = np.sqrt(mesh.width * mesh.height / count)
     grid = np.maximum(1, np.round(mesh.period / side)).astype(np.int64)
     column, row = (mesh.points[mesh.triangles[:, 0]] / mesh.period * grid).astype(np.int64).T

@@ -133,8 +133,8 @@ class Subdomain:
     def mean_strain(self, dofs: Int) -> Float:
         """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to int eps*.
 
-        The integral covers the subdomain and its share of adjacent voids: int_Omega eps* + int u (x) n ds over their
-        boundaries, with n outward from the voids.
+        The integral covers the subdomain and its share of adjacent voids: int_Omega eps*, plus int u (x) n ds over the
+        boundaries of the voids, with n outward from the voids.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():

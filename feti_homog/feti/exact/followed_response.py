@@ -51,7 +51,7 @@ class FollowedResponse:
         self._rows: Int = np.zeros(0, np.int64)
         # Number of the change at which every column was last used, and number of the present change.
         self._used, self._now = np.zeros(capacity, np.int64), 0
-        # The system provides this memory only when columns are written.
+        # The operating system provides this memory only when columns are written.
         self._buffer = np.zeros((len(answer), capacity), order="F")
         # Waiting changes of the stored columns: columns to subtract, and their factors in every stored column.
         self._waiting = np.zeros((len(answer), thresholds.WAITING_COLUMNS), order="F")
@@ -63,7 +63,7 @@ class FollowedResponse:
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Make room for `more` columns: drop the columns that were unused longest.
+        """Make room for `more` columns: drop the least recently used columns.
 
         Columns of the rows `needed` are not dropped; columns of `useful` rows (all rows,) are dropped last.
         """
@@ -135,7 +135,7 @@ class FollowedResponse:
     def follow(self, rows: Int, signs: Float, gains: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
         """Update U and the columns for changed rows.  Collective.
 
-        Returns False if a scaled pivot is at most `pivot`, so that digits are lost; then U and Gamma are useless.
+        Returns False if a scaled pivot is at most `pivot`: digits are lost, and U and Gamma are then useless.
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.

@@ -245,7 +245,7 @@ class ContactProblem:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
         Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and count as open
-        if a fibre is free without these nodes.  The fibre then moves to where its faces part least, if it has room.
+        if a fibre is free without these nodes.  The fibre then moves, if there is room, so that its faces part least.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

@@ -45,7 +45,7 @@ class _Fibres:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node, open or not.
-        fibre: (k,) number of the fibre; a fibre and its coating, and neighbouring layers, have one number.
+        fibre: (k,) number of the fibre; a fibre and its coating share a number, and so do neighbouring layers.
     """
 
     is_open: Bool
@@ -92,7 +92,7 @@ class _Fibres:
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return both fractions of a step between gaps (k,), as `FloatingBodies.admissible_share`."""
+        """Return both fractions of a step between gaps (k,), see `FloatingBodies.admissible_share`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]

@@ -86,7 +86,7 @@ class Equilibrium:
         certificate: errors, as returned by `kkt_errors`.
         asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes for
             all loads up to this load.
-        axial: equilibrium along the fibres with these bonds, in generalized plane strain.
+        axial: equilibrium along the fibres with the same bonds, in generalized plane strain; else None.
     """
 
     load: Load

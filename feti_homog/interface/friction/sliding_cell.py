@@ -137,7 +137,7 @@ class AxialFaces:
 
 
 class SlidingCell:
-    """The debonded faces of a cell, one set of faces at a time.
+    """The debonded faces of a cell; every call of `take` replaces the set of faces.
 
     Attributes:
         interface: plane contact problem.

@@ -178,7 +178,7 @@ class BondLaw(ABC):
 class SpringLaw(BondLaw):
     """A law for bonds that break at a certain energy of the undamaged springs.
 
-    A traction along the fibre adds to the slip energy, because all shear counts alike.
+    A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 
     Attributes:
         normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.

@@ -3,11 +3,11 @@
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 
 At a debonding tip the released energy is decisive.  The spring energy at a tip falls with the tributary length of the
-node, so that a criterion by spring energy depends on the mesh; a criterion by released energy does not.  With H the
+node, so a criterion by spring energy depends on the mesh; a criterion by released energy does not.  With H the
 inverse of the dual operator on the active rows, a break of bond i parts the faces by j = H_ii^-1 lam_i, and the energy
 of the cell falls, at constant strain, by
 
-    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, so that the normal force stays.
+    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, and therefore keep the normal force.
 """
 
 from __future__ import annotations

@@ -261,7 +261,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law with a table of traction over opening in mode I, stretched to the toughness of other modes."""
+    """A law with a table of traction over opening in mode I, stretched to match the toughness in other modes."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:

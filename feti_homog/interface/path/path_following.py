@@ -59,8 +59,8 @@ def increments(
     """Yield the points of the paper's loop, which breaks all overloaded bonds at equal load steps.  Collective.
 
     The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only`, only the
-    worst bonds break at a time.  A point without convergence is the last one; with friction the last point may be
-    at the largest load that the cell carries.
+    worst bonds break between two solves.  A point without convergence is the last one; with friction, the last point
+    may be at the largest load that the cell carries.
 
     Raises:
         NotCarriedError: the cell carries no more load, or a step has no admissible statuses.

@@ -95,9 +95,9 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) of an equilibrium, whatever their tractions.  Collective.
+    """Break the bonds `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
 
-    Return how many bonds part and how many soften, over all ranks, and the path state `place` after the break.
+    Return the numbers of bonds that part and that soften, over all ranks, and the path state `place` after the break.
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)
