@@ -243,7 +243,7 @@ class ExactInverse(Preconditioner):
     def inverse_blocks(self, pairs: Int) -> Float:
         """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs of active global rows.  If both rows i of a pair open, they part by H_ii^-1 lam_i.
+        All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)
