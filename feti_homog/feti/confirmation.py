@@ -75,8 +75,8 @@ class InfluenceSolutions:
     def record(self, solutions: list[DualSolution], d: Float) -> None:
         """Compare solutions by F lambda with the prediction, and renew the quota.  Collective.
 
-        The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty because a load has
-        no jump on the active rows.  An error above MOST_FOLLOWED_ERROR and twice the rounding renews the answer.
+        The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
+        on active rows.  If an error exceeds MOST_FOLLOWED_ERROR and twice the rounding, the answer is computed anew.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.

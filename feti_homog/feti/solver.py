@@ -154,7 +154,7 @@ class FetiSolver:
         """Set the active rows and the spring compliance.  Collective.
 
         `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
-        the intact compliance.  Only the coarse problem needs a new factor.  Raises like `Preconditioner.soften`.
+        the intact compliance.  No subdomain is factored anew.  Raises like `preconditioner.soften` and `.activate`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)

@@ -245,8 +245,8 @@ def build(
     Args:
         applications: expected number of products with F.
         compliance, soften: (owned rows,) compliance C of the intact springs, and whether C may grow.
-        recovers: whether the run needs interior displacements.  If so, `one_each` (`ProblemSizes`) keeps the factors of
-            subdomains, because a second factorization would take the same memory.
+        recovers: whether the run needs interior displacements.  If so, and with `ProblemSizes.one_each`, subdomains
+            keep their factors, because a second factorization would take the same memory.
 
     Raises:
         CaseError: the value of an option is unknown, options exclude each other, or a library lacks a factorization.

@@ -101,7 +101,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield each neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r common rows."""
+        """Yield every neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r shared rows."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:

@@ -159,7 +159,7 @@ class FollowedResponse:
         return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns for springs (k,) that gain compliance `more` (k,); return as `follow`.  Collective."""
+        """Update U and columns, like `follow`, for springs (k,) that gain compliance `more` (k,).  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -251,8 +251,8 @@ class FollowedResponse:
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
     """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
 
-    Rows can always become active (sign -1), and inactive (1) as long as no body becomes free.  The result is None if a
-    scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1); rows can become inactive (1) as long as no body becomes free.  The result
+    is None if a scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))

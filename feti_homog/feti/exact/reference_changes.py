@@ -63,7 +63,7 @@ class ReferenceChanges:
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
         """Compute the largest asymmetry of new columns against followed columns.  Collective.
 
-        Gamma' is symmetric.  The error is relative to the largest entry; `stiffness` (all rows,) makes both
+        Gamma' is symmetric.  The error is relative to the largest entry; `stiffness` (all rows,) makes all entries
         dimensionless.  The new `columns` (owned rows, k) belong to global `rows` (k,) outside C.
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T

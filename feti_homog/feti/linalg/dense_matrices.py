@@ -26,7 +26,7 @@ TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """Compute the Schur complement (n, n) of a matrix (dofs, dofs) on `rows` (n,), in Fortran order.
 
-    CHOLMOD eliminates the other rows in the `order` (dofs,), for which the diagonal on `rows` must be positive.
+    CHOLMOD eliminates the other rows in the `order` (dofs,); the diagonal on `rows` must then be positive.
     Without `order` or CHOLMOD, or with options under `feti_schur_`, MUMPS eliminates the other rows.
 
     Raises:

@@ -37,7 +37,7 @@ ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmeth
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
     """Return the power of two that scales the largest diagonal entry to [1, 2).
 
-    It is 1 if no entry is positive.  With `comm`, the diagonal is distributed, and the call is collective.
+    The scale is 1 if no entry is positive.  With `comm`, the diagonal is distributed, and the call is collective.
 
     Raises:
         LinAlgError: an entry is not finite; with `comm`, on all ranks.

@@ -68,8 +68,8 @@ class CoupledInterfaces:
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
         """Return the load at the beginning of the path leg to waypoint `end`.  Collective.
 
-        The load has the values of the waypoint `before`.  Components that change between strain and stress take the
-        values of the last point, `origin`, with 0 for a stress within the solver's error.
+        The load has the values of the waypoint `before`.  Without `before`, or if a component changes between strain
+        and stress, the value comes from the last point, `origin`; a stress within the solver's error counts as 0.
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         pairs = zip(parts, self.problems, strict=False)

@@ -30,7 +30,7 @@ from feti_homog.typing import Bool, Float, Int
 
 # Largest number of teeth that the program chooses.
 MOST_TEETH = 10_000
-# Fraction of the peak to which an exponential traction falls before the last tooth takes the remaining energy.
+# Teeth divide an exponential branch down to this fraction of the peak; the last tooth takes the remaining energy.
 EXPONENTIAL_TAIL = 0.01
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
            "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip

@@ -19,7 +19,7 @@ SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """The leg number `leg` of a path, at a fraction s that rises from 0 to 1.
+    """Leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
     The loads at s = 0 and s = 1 prescribe the same components as strains and as stresses.  Bonds break at constant
     load: the state before a break is a point, and the path continues from the state after the break at the same s.

@@ -126,5 +126,5 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
 
 
 def count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
-    """Count the nodes where `which` (k,) is true on all ranks.  Collective."""
+    """Count the nodes of all ranks where `which` (k,) is true.  Collective."""
     return int(cell.comm.allreduce(int(which.sum())))
