@@ -1,4 +1,4 @@
-"""Dual solutions by influence columns, and their confirmation by occasional products F lambda."""
+"""Compute dual solutions by influence columns, and confirm some of these solutions by products F lambda."""
 
 import numpy as np
 from mpi4py import MPI
@@ -15,7 +15,7 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """A dual solver by influence columns H, which confirms only some of its solutions by F lambda.
+    """A dual solver that multiplies by influence columns H, and confirms only some solutions by F lambda.
 
     If a solve with F lambda confirms the n solves before it, the next min(2 n + 1, MOST_UNCONFIRMED) solves skip
     F lambda: this number is the quota.
@@ -68,15 +68,15 @@ class InfluenceSolutions:
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
         """Compute the multipliers H d E (owned rows, k) for loads E (v, k).  Collective.
 
-        If `solutions` has just made a prediction, its multipliers times `weights` (k,) are returned instead.
+        If `solutions` has just made a prediction, return the predicted multipliers times `weights` (k,) instead.
         """
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
         """Compare solutions by F lambda with the prediction, and renew the quota.  Collective.
 
-        The quota drops to 0 if a solution needed iterations, or if `solutions` is empty because a load causes no jump
-        on the active rows.  A prediction is computed anew if its error exceeds MOST_FOLLOWED_ERROR and rounding.
+        The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
+        on active rows.  If an error exceeds MOST_FOLLOWED_ERROR and twice the rounding, the answer is computed anew.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.
@@ -108,10 +108,10 @@ class InfluenceSolutions:
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
         """Compute the errors of predicted multipliers and of predicted jumps.  Collective.
 
-        The errors are relative to the largest entry of a load in `lam` and `opening`, both (owned rows, k).  Jumps
-        count only if no body is free to move.  Multipliers of a load may cancel, for example where bonds are pressed:
-        their scale is at least LEAST_FOLLOWED times the multipliers under single strains.  The `residuals` (k,) are
-        relative errors of `lam`.
+        For every load, errors are relative to the largest entry in `lam` and in `opening`, both (owned rows, k).  Jumps
+        count only if no body is free to move.  Multipliers may cancel, for example where bonds are pressed, so the
+        scale of multipliers is at least LEAST_FOLLOWED times the multipliers under single strains.  `residuals` (k,)
+        are relative errors in `lam`.
         """
         assert self._prediction is not None
         predicted, jumps, terms = self._prediction

@@ -20,8 +20,8 @@ class DualSolution:
     """The solution of the dual problem, Eqs. (36) and (37), under one load.
 
     Attributes:
-        strain: (v,) load E, the macroscopic strain first, then the other loads of the problem; (v + m,) for tractions
-            on the sides, whose Sigma comes last.
+        strain: (v,) load E: the macroscopic strain, then the other loads of the problem; with tractions on the sides
+            (v + m,), followed by Sigma.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
@@ -42,7 +42,7 @@ class DualSolution:
 
     @property
     def opening(self) -> Float:
-        """Return the jumps B u* (owned rows,): spring elongations on active rows, else gap and slip."""
+        """Return the jumps B u* (owned rows,): spring elongations on active rows, gap and slip on inactive rows."""
         return self.jump + self.compliance * self.lam
 
 
@@ -79,10 +79,10 @@ class ActiveJumps:
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, active: Float, torn: Float) -> Float:
-        """Bound the rounding (k,) in active jumps of the torn cell under loads (v, k).
+        """Bound the rounding (k,) in jumps of the torn cell on active rows, under loads (v, k).
 
-        The bound is ZERO_JUMP `torn`.  If an `active` norm is above this bound, but below the square root of the
-        machine precision times `torn`, the bound is at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
+        The bound is ZERO_JUMP times `torn`.  If an `active` norm lies between this bound and the square root of the
+        machine precision times `torn`, all bounds are at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
 
         Args:
             displacement: (boundary dofs, v) displacements of the torn cell under unit loads, the same at every call.
@@ -122,7 +122,7 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Superpose solutions with equal active rows, multiplied by factors; `d` is as in `completed`."""
+        """Superpose solutions with equal active rows, weighted by `factors`; `d` is as in `completed`."""
         triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
         strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
         total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
@@ -138,7 +138,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Complete a solution of the present state by F lambda, which gives alpha.
+        """Compute alpha, jumps and residual of a solution in the present state, by F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """

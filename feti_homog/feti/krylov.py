@@ -19,17 +19,17 @@ from feti_homog.system.petsc import c_functions
 from feti_homog.typing import Float
 
 REASON = PETSc.KSP.ConvergedReason
-# PETSc's reasons for a stop that rounding causes.
+# PETSc's converged reasons for breakdowns by rounding.
 BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
-# Methods that apply the preconditioner to the residual itself, which gives the jump.  With other methods the
-# convergence test sees the forces alone, and the checks of a response test the jump.
+# Methods that apply the preconditioner to the true residual, from which the convergence test computes the jump.  With
+# other methods, the convergence test sees only the forces, and the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
 
 
 class ProjectedProblem:
-    """The shell matrix P F and the shell preconditioner P H on the active rows; keeps the last residual r."""
+    """The context of the shell matrix P F and the shell preconditioner P H; it stores the last residual r."""
 
     def __init__(
         self, errors: c_functions.CallbackErrors, preconditioner: Preconditioner, jumps: ActiveJumps, columns: int
@@ -63,7 +63,7 @@ class ProjectedProblem:
 
 
 class Stall:
-    """A test whether a norm has not halved within `patience` iterations."""
+    """A test for a norm that has not halved within `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
@@ -80,13 +80,13 @@ class Stall:
 
 
 class PrimalTest:
-    """PETSc's convergence test: two primal residuals must fall below rtol.
+    """PETSc's convergence test: the primal residuals of force and, with CG or FCG, of jump must fall below rtol.
 
     The jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual is
     |P H r| / |P M^-1 P d|, relative to the forces that close d.  Small dual residuals can hide large primal ones.
 
     Attributes:
-        ends_on_stall: whether a stall is a breakdown.
+        ends_on_stall: whether a stall ends the solve, as a breakdown.
         jump_scale, force_scale: |P d| and |P M^-1 P d| for the next solve.
     """
 
@@ -167,10 +167,10 @@ class Krylov:
         """Solve P F lam = `right` for projected jumps `right` (rows, k), starting from `lam` (rows, k).  Collective.
 
         With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
-        so that only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
+        so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
         residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        An exception in a product or in the convergence test is raised again if all ranks have it; else the job ends.
+        An exception in a product or the convergence test is raised again if it occurs on all ranks; else the job ends.
 
         Returns:
             Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.
@@ -178,7 +178,7 @@ class Krylov:
         iterations, jumps = 0, self._jumps
         for restart in range(MAX_RESTARTS + 2):
             self.test.ends_on_stall = self._restarts and restart <= MAX_RESTARTS
-            # The start for a load is 0 if `lam` leaves a larger residual.
+            # A load case starts from 0 if `lam` leaves a residual larger than `right`.
             applied, residual = np.zeros_like(lam), right
             if jumps.norms(lam).any():
                 applied = jumps.operator.apply(lam)

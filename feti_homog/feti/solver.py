@@ -72,7 +72,7 @@ class FetiSolver:
     ) -> None:
         """Factor the subdomains and the coarse problem.  Collective.
 
-        `applications`, the expected number of products with F, `recovers` and exceptions are as in `solver_plan.build`.
+        The arguments `applications` and `recovers`, and the exceptions, are as in `solver_plan.build`.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = torn_stiffness E + d^T lam; for pulled sides also -int u* (x) n ds.  Collective."""
+        """Compute |UC| Sigma = torn_stiffness E + d^T lam; if `is_pulled`, also -int u* (x) n ds.  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and solution.alpha is not None:
             local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
@@ -154,7 +154,7 @@ class FetiSolver:
         """Set the active rows and the spring compliance.  Collective.
 
         `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
-        the intact compliance.  Only the coarse problem needs a new factor.  Raises like `Preconditioner.soften`.
+        the intact compliance.  No subdomain is factored anew.  Raises like `preconditioner.soften` and `.activate`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)
@@ -182,7 +182,7 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return the loads (v + m, v) of unit strains: E, and with tractions the Sigma that keeps E the mean strain.
+        """Return the loads (v + m, v) of unit strains: E and, with tractions, the Sigma for which E is the mean strain.
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """
@@ -204,9 +204,9 @@ class FetiSolver:
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
         """Solve the dual problems for k loads together.  Collective.
 
-        One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` tells whether it converged.
-        With tractions on the sides, the solutions that gave `closure` are superposed.  With influence columns, raises
-        as `InfluenceSolutions.record`.
+        One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` reports convergence.
+        With tractions on the sides, the solutions that gave `closure` are superposed; raises like `closure`.  With
+        influence columns, raises like `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.

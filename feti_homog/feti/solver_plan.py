@@ -1,4 +1,4 @@
-"""Choice and construction of boundary operators, preconditioner and coarse spaces, from options and problem sizes.
+"""Choose and construct boundary operators, preconditioner and coarse spaces from options and problem sizes.
 
 `choose` is a pure function of options and sizes; `build` factors the subdomains, and constructs the chosen parts.
 """
@@ -94,7 +94,7 @@ class ProblemSizes:
         all_searchable: whether every subdomain can be searched for soft modes, as a whole or face by face.
         shared_dofs: degrees of freedom on shared nodes, with all bonds intact.
         has_thin: whether a body is thin.  A thin ring bends easily but resists a change of its thickness.  No scaling
-            reflects both, so that the Dirichlet preconditioner takes hundreds of iterations or does not converge.
+            reflects both: with the Dirichlet preconditioner, a solve takes hundreds of iterations or does not converge.
         one_each: whether there are several ranks with one subdomain each, and a subdomain has several materials.
     """
 
@@ -113,7 +113,7 @@ class SolverPlan:
 
     Attributes:
         preconditioner: one of PRECONDITIONERS except "auto", or BONDED.
-        adaptive: whether the coarse space has soft modes beside rigid-body motions.
+        adaptive: whether the coarse space has soft modes in addition to rigid-body motions.
     """
 
     preconditioner: str
@@ -133,9 +133,9 @@ class SolverPlan:
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
     """Choose the preconditioner and the coarse space from sizes and options.
 
-    If all operators are dense, the default is influence columns for a thin body, or for at least
-    `influence_applications` products and at most `assembled_schur_dofs` shared dofs, else BONDED for `one_each` and at
-    most `dense_boundary_dofs` shared dofs.  In all other cases the default is "dirichlet".
+    If all operators are dense, and no option requests the adaptive space, the default is influence columns for a thin
+    body, or for at least `influence_applications` products and at most `assembled_schur_dofs` shared dofs; else, if no
+    option requests a coarse space, BONDED for `one_each` and 1 to `dense_boundary_dofs` shared dofs; else "dirichlet".
 
     Raises:
         CaseError: two options exclude each other.
@@ -238,15 +238,15 @@ def build(
     thresholds: Thresholds = DEFAULTS,
     recovers: bool = False,
 ) -> SolverParts:
-    """Factor the subdomains, and construct the parts of the solver.  Collective.
+    """Factor the subdomains, and construct the parts of the solver.  Collective; also raises like `InterfaceOperators`.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
     Args:
         applications: expected number of products with F.
-        compliance: (owned rows,) compliance C of the intact springs, which may grow if they `soften`.
-        recovers: whether the run needs interior displacements.  If every rank has one subdomain, its factor is then
-            kept, because a second factorization would take the same memory.
+        compliance, soften: (owned rows,) compliance C of the intact springs, and whether C may grow.
+        recovers: whether the run needs interior displacements.  If so, and with `ProblemSizes.one_each`, subdomains
+            keep their factors, because a second factorization would take the same memory.
 
     Raises:
         CaseError: the value of an option is unknown, options exclude each other, or a library lacks a factorization.

@@ -1,4 +1,4 @@
-"""Debonded arcs with tips and interface nodes, and node chains along interfaces.
+"""Find tips and interface nodes of debonded arcs, and follow chains of nodes along interfaces.
 
 Directions are degrees about the centre of a fibre, from x1 towards x2.  The tips of an arc stay bonded.
 """
@@ -121,7 +121,7 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
     """Find the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
 
-    `marks` has the tips; the vertices lie on the fibres `fibre` (k,), numbered from 1, in the directions (k,).
+    `marks` are tips as returned by `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
     """
     moved = {}
     for number, ends in marks.items():

@@ -1,4 +1,4 @@
-"""Loads by strains or their conjugate stresses: macroscopic states, scales of load effects, solutions.
+"""Prescribe loads by strains or conjugate stresses, compute scales of load effects, and solve under a load.
 
 Scales for errors are sizes of load effects in the bonded cell, independent of debonding.  For mixed loads, solutions
 under the prescribed strains and under unit strains, with equal active rows, are superposed to meet the stresses.
@@ -48,7 +48,7 @@ class Macroscopic:
 
     @property
     def stored(self) -> float:
-        """The stored energy E.Sigma / 2 per cell area."""
+        """The stored energy E.Sigma / 2, per cell area."""
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
@@ -107,7 +107,7 @@ class LoadScales:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
         least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
         largest_stiffness: largest entry of Reuss' bound.
-        bound_ratio: least ratio of Reuss' to Voigt's bound for strains: least share of `asked` that a stress causes.
+        bound_ratio: least ratio of Reuss' to Voigt's bound for strains; a stress causes at least this share of `asked`.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
         longest: (k,) largest tributary length on the interface of each node.
@@ -129,8 +129,8 @@ class LoadScales:
         self.bound_ratio = float(np.linalg.eigvals(ratios).real.min())
         self.roots = np.full(len(self.mean_stiffness), np.inf)
         self.roots[:stresses] = np.sqrt(self.least_bonded_stiffness.diagonal()[:stresses])
-        # Loads other than strains have as scale the largest strain that they cause in a free body: a soft body that
-        # expands hardly moves a stiff body, but the dual problem has to close its free expansion.
+        # The scale of a load other than a strain is the largest strain that the load causes in a free body: a soft body
+        # that expands hardly moves a stiff body, but the dual problem has to close the free expansion.
         free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
         self._strains = np.hstack([np.eye(m), np.abs(free).max(axis=0)])
         # The softer body in series with the springs: stress (k,) at bonds per cell strain.
@@ -146,7 +146,7 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return, for each node, the largest of the values (k,) on its interface, at least 0.  Collective."""
+        """Return the largest of `values` (k,) on the interface of every node, but at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -198,7 +198,7 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Bound the strain sizes (v,) of a state by `bound_ratio` and ABSURD times `asked`, as scales for errors.
+        """Clip the strain sizes (v,) of a state to [`bound_ratio` `asked`, ABSURD max(`asked`)], as scales for errors.
 
         The lower bound matters where a path with friction returns to zero stress.
         """
@@ -221,7 +221,7 @@ class LoadScales:
 def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains whose stresses are below the noise stay zero.
+    Strains that no stiffness resists stay zero if their stresses are below the noise.
 
     Raises:
         NotCarriedError: no stiffness resists the stresses.
@@ -257,7 +257,7 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """Mark the strains (v,) of prescribed stresses that contribute to a strain without stiffness.  Collective.
+    """Mark strains (v,) under prescribed stresses that contribute to a strain without stiffness.  Collective.
 
     Such a strain only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
     stress.  `voigt` (v, v) is the stress integral of clamped bodies.

@@ -57,7 +57,7 @@ class AdaptiveCoarseSpace:
 
         Raises:
             MeshError: a face neighbourhood on some rank is not a valid subdomain.
-            LinAlgError, CaseError: as `factor`.
+            LinAlgError, CaseError: as in `factor`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         self.comm, self.threshold = comm, threshold
@@ -86,7 +86,7 @@ class AdaptiveCoarseSpace:
     def activate(self, active: Float) -> None:
         """Average the modes over node copies on active rows, and factor again.  Collective.
 
-        Rows are active where `active` (owned rows,) is 1; the scaling has the same active rows.  Raises like `factor`.
+        Rows are active where `active` (owned rows,) is 1; activate the scaling first.  Raises like `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
@@ -114,7 +114,7 @@ class AdaptiveCoarseSpace:
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
         have no energy and get no equation; other modes may be linearly dependent.  Adding eps I makes the matrix
-        definite; from forces of a coarse displacement with scaled energy mu, S_0 then keeps eps / (mu + eps).
+        definite; S_0 then keeps the fraction eps / (mu + eps) of the forces S z of a mode z with scaled energy mu.
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
@@ -165,7 +165,7 @@ class AdaptiveCoarseSpace:
             return distributed_arrays.scale_rows(self._weights, self.solver.solve(right))
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Iterate over the subdomains: mode positions, S Z_0, and slice of the boundary dofs."""
+        """Iterate over the mode positions, S Z_0, and the slice of boundary dofs of every subdomain."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:

@@ -72,7 +72,7 @@ def trace_space(
 
 
 def _every_second(submesh: Submesh, nodes: Int) -> csr_matrix:
-    """Interpolate boundary vertices `nodes` (n,) between every second vertex along the boundary: (n, m)."""
+    """Build the interpolation (n, m) to boundary vertices `nodes` (n,) from every second vertex along the boundary."""
     one_sided = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1
     ends = submesh.vertex_class[submesh.edges[one_sided[submesh.edge_class]]]
     rows, columns = np.searchsorted(nodes, ends[np.isin(ends, nodes).all(axis=1)]).T
@@ -80,7 +80,7 @@ def _every_second(submesh: Submesh, nodes: Int) -> csr_matrix:
     beside += beside.T
     start = np.unique(connected_components(beside, directed=False)[1], return_index=True)[1]
     is_odd = dijkstra(beside, indices=start, unweighted=True, min_only=True) % 2 == 1
-    # Ends and forks of lines remain, and neighbours at odd distances, where a closed line has an odd length.
+    # Ends and forks of lines remain, and adjacent nodes at odd distances, which a closed line of odd length has.
     between = is_odd & (np.diff(beside.indptr) == 2) & (beside @ is_odd == 0)
     return (diags(1.0 - between) + diags(between / 2) @ beside).tocsr()[:, ~between]
 

@@ -41,7 +41,7 @@ class AveragedModes:
     def __init__(
         self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
     ) -> None:
-        """Exchange the jumps B V; `V` has (boundary dofs, modes) for every local subdomain.  Collective."""
+        """Exchange the jumps B V; `V` holds an array (boundary dofs, modes) for every subdomain.  Collective."""
         self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
         counts = np.zeros(len(neighbours.rank), np.int64)
         counts[neighbours.index] = [v.shape[1] for v in V]
@@ -54,7 +54,7 @@ class AveragedModes:
                 Z, s = block.B @ v, neighbours.index[i]
                 first = ends[s] - v.shape[1]
                 for t, rows in neighbours.common[i].items():
-                    # A subdomain has all its modes, even if a mode opens no jump.
+                    # All modes of a subdomain reach the subdomain, even a mode that opens no jump.
                     modes = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[rows].any(axis=0))
                     yield i, t, (first + modes, Z[np.ix_(rows, modes)])
 
@@ -99,7 +99,7 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1.  Collective; `rows` as `Neighbours.rows`."""
+    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1, at `Neighbours.rows`.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
@@ -154,7 +154,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Cut the columns `span` out of a matrix; all their nonzeros are in sorted `rows`."""
+    """Cut the columns `span` out of a matrix, at the sorted `rows` that contain all nonzeros of these columns."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

@@ -5,7 +5,7 @@ For a subdomain s with Schur complement S_s and constraints B_s, boundary displa
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
 are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem costs too much.  But if
-every node belongs to one other body only, the weights of M^-1 hardly change along the boundary: s contributes at most
+every node belongs to only one other body, the weights of M^-1 hardly change along the boundary: s contributes at most
 S_s to M^-1, and it is the neighbour's contribution that makes p stiff.  Then every face has a separate eigenproblem,
 with the Schur complement of the face neighbourhood instead of S_s.  All eigenproblems are projected to trace spaces.
 """
@@ -69,7 +69,7 @@ class SubdomainEigenproblem:
         self._share = BW @ (BW @ operator.S.astype(np.float32)).T
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield each neighbour, and this subdomain's part (r, r) of M^-1 on their r common rows."""
+        """Yield every neighbour s, and this subdomain's part (r, r) of M^-1 on r rows shared with s."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
@@ -101,7 +101,7 @@ class FaceEigenproblems:
         }
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
-        """Yield each neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r common rows."""
+        """Yield every neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r shared rows."""
         for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for part in neighbourhoods:
@@ -147,8 +147,8 @@ def eigenproblem(
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
     """Compute the forces N p (n, m), N = B^T M B, projected so that R^T N p = 0.
 
-    S+ N p is a step of inverse iteration: it turns an eigenvector p (n, m) of the trace space into a displacement that
-    the body can have.  `R` (n, k) is the kernel.  The result is as precise as M.
+    S+ N p is a step of inverse iteration, which turns an eigenvector p (n, m) of the trace space into a displacement of
+    the body itself.  `R` (n, k) is the kernel.  The result has the precision of M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
     inverse = np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True)
@@ -176,7 +176,7 @@ def soft_modes(S: Float, N: Float, threshold: float) -> Float:
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]
-    # Without the kernel part, eigenvectors of N are N-orthogonal to the kernel, and there the regularised matrix is S.
+    # Without its kernel part, N has eigenvectors N-orthogonal to the kernel, for which the regularised matrix equals S.
     reduced = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
     # A Cholesky factorization detects soft modes at a tenth of the cost of an eigenproblem.
     try:

@@ -19,9 +19,9 @@ from feti_homog.typing import Float, Int
 class NaturalCoarseSpace:
     """The rigid-body motions of all subdomains, and P = I - G (G^T G)^-1 G^T.
 
-    P projects on multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f vanishes, because the load of a macroscopic
-    strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every kernel mode.  A
-    rank stores its owned rows of G, and its part of a factor of G^T G.
+    P projects onto multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f vanishes, because the load of a
+    macroscopic strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every
+    kernel mode.  A rank stores its owned rows of G, and a factor of G^T G or a part of it (`DistributedSolver`).
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
@@ -29,7 +29,7 @@ class NaturalCoarseSpace:
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m) jumps of the modes.
         body: (m,) body numbers of the modes.
-        pinned_body: body with the pinned node class, or one of several; -1 without a pinned class.
+        pinned_body: body with held nodes or with supporting springs, the last of several; -1 without such a body.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
         unknowns: (u,) numbers of owned modes, and of modes in owned rows of G or in local unconstrained modes.
         factorizations: number of factorizations of G^T G.
@@ -95,7 +95,7 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return the matrix G^T A G; it stores 36 products per row.  The first call is collective.
+        """Return the matrix G^T A G, with 36 products per row between two bodies.  The first call is collective.
 
         Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
         """
@@ -126,7 +126,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x (owned rows,) or (owned rows, k), 0 on inactive rows.  Collective."""
+        """Compute P x for x, (owned rows,) or (owned rows, k), which is 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -140,7 +140,7 @@ class NaturalCoarseSpace:
 
 
 class GramMatrix:
-    """The matrix G^T A G for active rows A = diag(a) that change, summed from stored products."""
+    """The matrix G^T A G for changing active rows A = diag(a), summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
         """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
@@ -154,8 +154,8 @@ class GramMatrix:
         diagonal = np.arange(self._m) * (self._m + 1)
         self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
         entry = np.searchsorted(self._keys, key)
-        # For every row, its first product and number of products; for every product, the entry it adds to and its
-        # value.
+        # For every row, the number of its first product, and its number of products; for every product, its value and
+        # the entry to which it adds.
         self._first, self._count = np.cumsum(count**2) - count**2, count**2
         self._entry, self._product = entry, G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
@@ -207,7 +207,7 @@ class GramMatrix:
         return Z
 
     def groups(self, modes: Int) -> list[Int]:
-        """Group the modes that G^T G couples: an array (groups, size) for every group size."""
+        """Group `modes` that G^T G couples; return an array (groups, size) for every group size."""
         position = np.full(self._m, -1)
         position[modes] = np.arange(len(modes))
         i, j = position[self._rows], position[self._columns]

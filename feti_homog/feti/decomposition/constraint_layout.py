@@ -54,7 +54,7 @@ class ConstraintLayout:
     """The layout of B on one rank: rows and columns of the n shared entities.
 
     Attributes:
-        components: rows c of a vector constraint.
+        components: number c of rows of a vector constraint.
         count: (n,) number of rows at an entity.
         first: (n,) first local row at an entity.
         rows: (local rows,) global row numbers.
@@ -210,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """List the entity of every fine node, and its position p there; `nodes` (e,) are counts."""
+    """List the entity and the position p of every fine node; `nodes` (e,) counts the nodes of `entities` (e,)."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

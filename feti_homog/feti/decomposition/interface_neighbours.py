@@ -17,7 +17,7 @@ SIDES = {3: ((0, 1), (1, 2), (2, 0)), 6: ((0, 3), (3, 1), (1, 4), (4, 2), (2, 5)
 
 
 class Neighbours:
-    """The neighbours of local subdomains: subdomains that share nodes, and the subdomain itself.
+    """The neighbours of local subdomains: a subdomain itself, and all subdomains that share nodes with it.
 
     Attributes:
         index: global numbers of the local subdomains.
@@ -61,7 +61,7 @@ class Neighbours:
         Args:
             messages: (i, s, message) from local subdomain i to the subdomain with global number s.
             deliver: called on the rank of s with the local position of s, the global number of the sender, and the
-                message; within a rank at once, while `messages` is read.
+                message; for messages within a rank, the call comes at once, while `messages` is read.
         """
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
@@ -94,7 +94,7 @@ class InterfaceNeighbours:
         self.first = int(np.searchsorted(self.rows, rows[0])) if len(rows) else 0
         bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
         number = self.node_numbers(jump_operator)
-        # Outer sides of the subdomains of each body between interface nodes a < b, as codes a n + b.
+        # Boundary sides of the subdomains in a body, between interface nodes a < b, as codes a n + b.
         none = np.zeros(0, np.int64)
         codes, first = ([none], [none]), 0
         for s in subdomains:

@@ -58,11 +58,11 @@ class JumpOperator:
         components: number of rows of a vector constraint.
         B: (local rows, local dofs) signed and rotated entries; local rows are all rows with an entry at a local dof.
         rows: (local rows,) global row numbers.
-        node_rows: as `ConstraintLayout.node_rows`.
+        node_rows: as returned by `ConstraintLayout.node_rows`.
         shared_dofs: number of displacements at nodes that subdomains share, on all ranks.
         nodes: interface nodes that this rank owns.
-        outer_copies: as `ConstraintLayout.outer_copies`.
-        copies, inside: as `ConstraintLayout.facing`.
+        outer_copies: as returned by `ConstraintLayout.outer_copies`.
+        copies, inside: as returned by `ConstraintLayout.facing`.
         owned: half-open range of the global rows that this rank owns.
         global_rows: number of rows on all ranks.
         shared: vertices and edges to which the rows belong.
@@ -128,7 +128,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """The PETSc scatter between owned and local rows for k columns; without effect if both are equal."""
+    """The PETSc scatter between owned and local rows for k columns; no operation if these rows are equal."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))

@@ -1,4 +1,4 @@
-"""Partition of bodies into subdomains, and assignment of subdomains to ranks."""
+"""Partition bodies into subdomains, and assign the subdomains to ranks."""
 
 import heapq
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
-    The strips run along x or y, have about half of the triangles (within STRIP_SLACK), and their boundaries have as few
+    The strips run along x or y, with about half of the triangles each (within STRIP_SLACK), and with as few boundary
     edges as possible; boundaries of two METIS parts are up to 50 % longer.  Returns None if a strip is not connected.
     """
     tail, head, _ = torus.sides
@@ -66,7 +66,7 @@ def halves(torus: Torus) -> Partition | None:
 
 
 def blocks(mesh: CoarseMesh, count: int) -> tuple[Int, Int]:
-    """Divide a mesh of square pixels into about `count` rectangular blocks, as `parts` and `pieces` of `decompose`."""
+    """Divide a mesh of square pixels into about `count` rectangles; return `parts` and `pieces` for `decompose`."""
     side = np.sqrt(mesh.width * mesh.height / count)
     grid = np.maximum(1, np.round(mesh.period / side)).astype(np.int64)
     column, row = (mesh.points[mesh.triangles[:, 0]] / mesh.period * grid).astype(np.int64).T
@@ -77,7 +77,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     """Compute the subdomain (m,) of every triangle by METIS.
 
     Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.  METIS makes
-    short cuts, which cross narrow gaps instead of following them, so that the iteration converges faster.
+    short cuts, across narrow gaps instead of along them, with which the iteration converges faster.
 
     Args:
         parts: (m,) body of every triangle: `torus.constituent`, or `torus.plane_parts()`.
@@ -106,7 +106,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Distribute `count` pieces (b,) over bodies with `load` (b,) triangles: divide the largest pieces first."""
+    """Choose piece counts (b,), in all `count`, for bodies with `load` (b,) triangles; large pieces divide first."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -120,7 +120,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs a piece."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs per piece at most."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -131,7 +131,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into parts (n,) with even `load` (n,), or vertex counts, and a small edge cut."""
+    """Divide a graph by METIS into parts (n,) with a small edge cut and equal `load` (n,), or equal vertex counts."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)
@@ -139,10 +139,10 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """Assign subdomains with `load` (s,) triangles to ranks: (s,).
+    """Assign subdomains with `load` (s,) triangles to ranks; return the rank (s,) of every subdomain.
 
-    METIS keeps neighbours (left, right), one pair for every shared edge, on the same rank.  If its largest load exceeds
-    the largest balanced load by MAX_IMBALANCE, only loads decide.  Ranks stay empty if subdomains are too few.
+    METIS keeps neighbours (left, right), one pair per shared edge, together.  If a rank would stay empty, or get more
+    than MAX_IMBALANCE times the largest balanced load, only loads decide.  With too few subdomains, ranks stay empty.
     """
     by_load = distributed_arrays.balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:

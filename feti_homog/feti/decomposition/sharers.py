@@ -1,4 +1,4 @@
-"""Search for the subdomains that share coarse vertices and edges, by all ranks together.
+"""Find the subdomains that share coarse vertices and edges, by messages between all ranks.
 
 A vertex or edge has a key, and a home rank: key modulo ranks.  Every rank sends the keys that several subdomains may
 share to the home ranks, with the rank's own subdomains at each key.  A home rank sorts all subdomains of a key, and
@@ -61,7 +61,7 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Find the entities that local subdomains share, without pinned classes.  Collective."""
+    """Find the entities that local subdomains share, except pinned vertex classes.  Collective."""
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1

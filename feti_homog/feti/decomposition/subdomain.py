@@ -25,7 +25,7 @@ class Subdomain:
         submesh: coarse mesh.
         mesh: refined mesh.
         problem: components of the displacement, and unit loads.
-        L: (v, v) stiffness of the material, see `assemble`; with several materials, their mean over the area.
+        L: (v, v) stiffness of the material, see `assemble`; with several materials, the mean over the area.
         laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
         Q: (cn, v) unit loads: f = -Q E; with given tractions on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
@@ -133,8 +133,8 @@ class Subdomain:
     def mean_strain(self, dofs: Int) -> Float:
         """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to int eps*.
 
-        The integral covers the subdomain and its share of adjacent voids: int_Omega eps* + int u (x) n ds over their
-        boundaries, with n outward from the voids.
+        The integral covers the subdomain and its share of adjacent voids: int_Omega eps*, plus int u (x) n ds over the
+        boundaries of the voids, with n outward from the voids.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
@@ -168,7 +168,7 @@ class Subdomain:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
         If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to the stiffness of the body, which may exceed all forces on it by far.
+        adds rounding in proportion to the stiffness of the body, which may be far larger than all forces on the body.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -192,9 +192,9 @@ class Subdomain:
     def compressible_share(self) -> float:
         """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) on the diagonal of K.
 
-        It reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu, but single
-        nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for several
-        materials, none of which is nearly incompressible.
+        The factor reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu,
+        but single nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for
+        several materials, none of which is nearly incompressible.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -204,7 +204,7 @@ class Subdomain:
     def elimination_order(self) -> Int | None:
         """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
 
-        The library's order is cheaper below LEAST_ORDERED_DOFS dofs, and without refinement.
+        The library's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
@@ -229,7 +229,7 @@ class Subdomain:
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))
-        # Three far-apart nodes for three modes, else the node farthest from the pinned class.
+        # For three modes three nodes far apart, else the node farthest from the first held class or from the mean.
         x = self.positions[candidates]
         origin = self.positions[self.held[:1]] if len(self.held) else x.mean(axis=0)
         apart = [np.argmax(((x - origin) ** 2).sum(axis=1))]

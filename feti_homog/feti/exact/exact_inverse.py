@@ -5,7 +5,7 @@ since: their bonds broke, closed or softened.  `followed_response` updates the c
 every change.  With these columns, `reference_changes` turns any response of the reference cell into the present one.
 
 When C has more rows than `feti_influence_columns`, the cell in its present state, but with the initial compliance, is
-factored as the new reference cell.  The cell is factored too where an update would lose too many digits; columns are
+factored as the new reference cell.  The cell is also factored if an update would lose too many digits; columns are
 then followed from the new response.
 """
 
@@ -84,7 +84,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state; return False if a pivot is below `pivot`.  Collective."""
+        """Update followed columns to the next state; return False if a pivot is at most `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -99,7 +99,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _restart(self) -> None:
-        """Factor the cell in its present state, and follow columns from its response.  Collective."""
+        """Factor the cell in its present state, and follow columns from the new response.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         nothing = np.zeros((self._rows, 0))
@@ -162,7 +162,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global rows (k,) if their asymmetry is at most `max_error`.  Collective."""
+        """Follow columns at global rows (k,); return False if their asymmetry exceeds `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -243,7 +243,7 @@ class ExactInverse(Preconditioner):
     def inverse_blocks(self, pairs: Int) -> Float:
         """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs of active global rows.  If both rows i of a pair open, they part by H_ii^-1 lam_i.
+        All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)

@@ -14,9 +14,9 @@ with the other entries as above.  Springs of inactive rows have the initial comp
 a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs only the columns of
 I; changes of the other stored columns are collected, and applied when there are WAITING_COLUMNS of them.
 
-A row that becomes inactive and alone resisted a motion of a body becomes a pin.  A pin stays among the active rows
-with multiplier and jump 0, which fixes one of the possible positions of the body, until a row becomes active that
-resists the motion.
+If a row becomes inactive that alone resists a motion of a body, the row becomes a pin.  A pin stays among the active
+rows, with multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists
+the motion becomes active.
 """
 
 import numpy as np
@@ -51,7 +51,7 @@ class FollowedResponse:
         self._rows: Int = np.zeros(0, np.int64)
         # Number of the change at which every column was last used, and number of the present change.
         self._used, self._now = np.zeros(capacity, np.int64), 0
-        # The system provides this memory only when columns are written.
+        # The operating system provides this memory only when columns are written.
         self._buffer = np.zeros((len(answer), capacity), order="F")
         # Waiting changes of the stored columns: columns to subtract, and their factors in every stored column.
         self._waiting = np.zeros((len(answer), thresholds.WAITING_COLUMNS), order="F")
@@ -63,7 +63,7 @@ class FollowedResponse:
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Make room for `more` columns: drop the columns that were unused longest.
+        """Make room for `more` columns: drop the least recently used columns.
 
         Columns of the rows `needed` are not dropped; columns of `useful` rows (all rows,) are dropped last.
         """
@@ -135,7 +135,7 @@ class FollowedResponse:
     def follow(self, rows: Int, signs: Float, gains: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
         """Update U and the columns for changed rows.  Collective.
 
-        Returns False if a scaled pivot is at most `pivot`, so that digits are lost; then U and Gamma are useless.
+        Returns False if a scaled pivot is at most `pivot`: digits are lost, and U and Gamma are then useless.
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.
@@ -150,7 +150,7 @@ class FollowedResponse:
         parts = np.array_split(softer, len(softer) // thresholds.WAITING_COLUMNS + 1)
         if not all(self.soften(rows[part], gains[part], pivot) for part in parts if len(part)):
             return False
-        # First rows become active, so that fewer bodies are free in between; half of the room is for pins.
+        # Rows become active first, so that fewer bodies are free in between; half of the room is for pins.
         moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(signs[moves], kind="stable")]
         for part in np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1) if len(moves) else []:
@@ -159,7 +159,7 @@ class FollowedResponse:
         return True
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns for springs (k,) that gain compliance `more` (k,); return as `follow`.  Collective."""
+        """Update U and columns, like `follow`, for springs (k,) that gain compliance `more` (k,).  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -251,8 +251,8 @@ class FollowedResponse:
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
     """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
 
-    Rows can always become active (sign -1), and inactive (1) as long as no body becomes free.  The result is None if a
-    scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1); rows can become inactive (1) as long as no body becomes free.  The result
+    is None if a scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
@@ -274,5 +274,5 @@ def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple
 
 
 def _has_digits(block: Float, pivot: float) -> bool:
-    """Return whether the singular values of `block` exceed `pivot`."""
+    """Return whether all singular values of `block` exceed `pivot`."""
     return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > pivot)

@@ -121,7 +121,7 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
 
 
 class BodyTies:
-    """Two bonds that tie every fibre to the body around it: its first bond, and the bond farthest from it."""
+    """Two bonds that tie every fibre to the body around it: the first bond, and the bond farthest from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the two bonds of every pair of bodies.  Collective."""
@@ -233,8 +233,8 @@ class ReferenceCell:
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     """Build B_D (local rows, boundary dofs) with B B_D^T = I, moving one body per bond.  Collective.
 
-    Only the moved body needs forces.  It is the inner body, unless the inner body is more than STIFF_FIBRES times as
-    stiff as the outer body, so that its forces would lose digits.
+    Only the moved body needs forces.  The inner body moves, unless its forces would lose digits because it is more than
+    STIFF_FIBRES times as stiff as the outer body.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
@@ -264,9 +264,9 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 
 
 class BondedInverse(Preconditioner):
-    """The preconditioner z = H r, with the exact inverse H by a factored cell.
+    """The preconditioner z = H r, with the exact inverse H from a factored cell.
 
-    Unlike `ExactInverse`, it factors the cell for every new set of active rows.
+    Unlike `ExactInverse`, this preconditioner factors the cell for every new set of active rows.
     """
 
     is_exact = True

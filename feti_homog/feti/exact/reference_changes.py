@@ -4,7 +4,7 @@ Let W be diagonal: s = 1 on rows that became inactive, s = -1 on rows that becam
 gained the compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a column or an
 answer U of the reference cell becomes the present column or answer
 
-    U' = U - Gamma'_:C W U_C,  after U is set to 0 on rows that became inactive or active.
+    U' = U_0 - Gamma'_:C W U_C,  where U_0 is U with 0 on rows that became inactive or active.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ class ReferenceChanges:
         self._places = places[self._mine]
 
     def present(self, columns: Float) -> Float:
-        """Compute U' = U - Gamma'_:C W U_C (owned rows, k) for U = `columns` (owned rows, k).  Collective."""
+        """Compute U' = U_0 - Gamma'_:C W U_C (owned rows, k) for U = `columns` (owned rows, k).  Collective."""
         response = columns.copy()
         response[self._places[self._signs[self._mine, 0] != 0.0]] = 0.0
         response -= self._followed.product(self.rows, self._weights * self._gathered(columns))
@@ -63,7 +63,7 @@ class ReferenceChanges:
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
         """Compute the largest asymmetry of new columns against followed columns.  Collective.
 
-        Gamma' is symmetric.  The error is relative to the largest entry; `stiffness` (all rows,) makes both
+        Gamma' is symmetric.  The error is relative to the largest entry; `stiffness` (all rows,) makes all entries
         dimensionless.  The new `columns` (owned rows, k) belong to global `rows` (k,) outside C.
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
@@ -79,7 +79,7 @@ class ReferenceChanges:
         return distributed_arrays.gather_rows(self._comm, x, self._first, self.rows)
 
     def _spread(self, values: Float) -> Float:
-        """Return owned rows (owned rows, k) with `values` (c, k) on C, else 0."""
+        """Return x (owned rows, k) with `values` (c, k) on the rows C, and 0 on all other rows."""
         x = np.zeros((len(self._cell.active), values.shape[1]))
         x[self._places] = values[self._mine]
         return x

@@ -19,15 +19,15 @@ from feti_homog.typing import Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.linalg.partial_cholesky import PartialFactor
 
-# INFOG(1) of MUMPS if the workspace is too small; then the percentages added to the estimate, one after the other.
+# INFOG(1) of MUMPS if the workspace is too small, and percentages that are added to its estimate, one after the other.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """Compute the Schur complement (n, n) of a matrix (dofs, dofs) on `rows` (n,), in Fortran order.
 
-    CHOLMOD eliminates the other rows in the `order` (dofs,), if the diagonal on `rows` is positive.  Without `order`,
-    or with options under `feti_schur_`, MUMPS eliminates these rows.
+    CHOLMOD eliminates the other rows in the `order` (dofs,); the diagonal on `rows` must then be positive.
+    Without `order` or CHOLMOD, or with options under `feti_schur_`, MUMPS eliminates the other rows.
 
     Raises:
         LinAlgError: the block of the other rows is not positive definite, or the matrix is not finite.

@@ -1,4 +1,4 @@
-"""Partial Cholesky factorizations by the CHOLMOD library of PETSc, which has no interface for them.
+"""Partial Cholesky factorizations by PETSc's CHOLMOD library, for which PETSc has no interface.
 
 MUMPS orders the eliminated rows without regard to the remaining rows, and is slower if many rows remain.  CHOLMOD
 accepts an order of all rows.  The structures below follow CHOLMOD's manual, and are the same in KNOWN_VERSIONS.
@@ -83,7 +83,7 @@ def is_available() -> bool:
 
 
 class PartialFactor:
-    """The Cholesky factor L of A = L L^T (n, n) that eliminates m chosen rows last.
+    """The Cholesky factor L of A = L L^T (n, n), with m chosen rows eliminated last.
 
     The destructor of this object frees the factor.
     """

@@ -37,7 +37,7 @@ ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmeth
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
     """Return the power of two that scales the largest diagonal entry to [1, 2).
 
-    It is 1 if no entry is positive.  With `comm`, the diagonal is distributed, and the call is collective.
+    The scale is 1 if no entry is positive.  With `comm`, the diagonal is distributed, and the call is collective.
 
     Raises:
         LinAlgError: an entry is not finite; with `comm`, on all ranks.
@@ -91,7 +91,7 @@ class DirectSolver:
         """Factor A = `matrix`, by default by CHOLMOD's Cholesky; see `factored`.
 
         Raises:
-            LinAlgError, MemoryError, CaseError: as `factored`.
+            LinAlgError, MemoryError, CaseError: as in `factored`.
         """
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
@@ -148,8 +148,8 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
     """Return a KSP with the Cholesky factor of a symmetric definite matrix A.
 
     Collective on the ranks of A.  `library` is the default, and options with `prefix` may choose another method.  With
-    `is_ordered`, the rows are eliminated in their order.  Rows and columns should have similar size, because MUMPS does
-    not scale here: its scaling loses all digits of coarse problems with contrasts of 1e6.
+    `is_ordered`, the rows are eliminated in their order.  Rows and columns should have similar sizes, as MUMPS does not
+    scale here: the scaling of MUMPS loses all digits of coarse problems with contrasts of 1e6.
 
     Raises:
         LinAlgError: A is not positive definite, or nearly singular.

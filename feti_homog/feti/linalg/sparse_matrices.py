@@ -18,8 +18,8 @@ def sum_of_blocks(
 ) -> csr_matrix:
     """Sum dense blocks (rows (r,), columns (c,), values (r, c)) into a sparse matrix.
 
-    A buffer collects blocks until it has more entries than `max_buffered_entries` and than the sum.  So the memory is
-    at most about twice the sum, and the sum is copied only when its entries have doubled.
+    A buffer collects blocks until it holds more entries than `max_buffered_entries`, and more than the sum.  So the
+    memory is at most about twice the sum, and the sum is copied only when its entries have doubled.
     """
     total, buffer, buffered_entries = csr_matrix(shape), [], 0
     for rows, columns, values in blocks:
@@ -60,7 +60,7 @@ def assemble_owned_rows(
     Args:
         local: (r, c) contribution of this rank.
         rows, columns: (r,) and (c,) global numbers of the rows and columns of `local`.
-        owned: how many rows and how many columns this rank owns.
+        owned: numbers of rows and of columns that this rank owns.
     """
     A = _assemble(comm, local, rows, columns, owned)
     indptr, indices, values = A.getValuesCSR()
@@ -126,7 +126,7 @@ def _even_share(comm: MPI.Intracomm, n: int) -> int:
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Sum local matrices into a distributed PETSc matrix, as `assemble_owned_rows`.  Collective."""
+    """Sum local matrices into a distributed PETSc matrix; arguments as in `assemble_owned_rows`.  Collective."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)
@@ -167,7 +167,7 @@ class DistributedSolver:
 
         Raises:
             LinAlgError: A is not positive definite on a rank (rounding may differ between processors); all ranks raise.
-            MemoryError, CaseError: as `factored`.
+            MemoryError, CaseError: as in `factored`.
         """
         self.destroy()
         error = None
@@ -209,7 +209,7 @@ class DistributedSolver:
     def solve(self, B: Float) -> Float:
         """Solve A X = sum of B over ranks; return the local unknowns (u,) or (u, k).  Collective.
 
-        B (u,) or (u, k) is the part of this rank; `factor` must precede.
+        B (u,) or (u, k) is the part of this rank; call `factor` first.
         """
         assert self._ksp is not None, "no matrix is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]

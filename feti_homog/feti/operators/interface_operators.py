@@ -58,9 +58,9 @@ def choose(
     Returns two flags for every subdomain: `explicit`, dense matrices instead of sparse factors, and `facewise`, soft
     modes computed face by face.
 
-    By default a subdomain gets dense matrices if n <= `dense_boundary_dofs`, and if their inverse takes no longer than
-    all products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), or it has springs, or soft modes
-    need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
+    By default a subdomain with n <= `dense_boundary_dofs` gets dense matrices if the inverse takes no longer than all
+    products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
+    modes need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
 
     Args:
         sizes: sizes of the subdomains; the result has the same order.
@@ -195,7 +195,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return whether boundary dofs (n,) belong to an inner body: to any but the outermost at the node."""
+        """Return whether boundary dofs (n,) belong to an inner body: to any body at the node except the outermost."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -212,7 +212,7 @@ class InterfaceOperators:
     def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
         """Compute S~ x, with the stiffness S~ of bodies with springs, for x (n,) or (n, k).
 
-        `which` (subdomains,) selects subdomains; the result is 0 on the others.
+        `which` (subdomains,) selects subdomains; the result is 0 on all other subdomains.
         """
         chosen = None if which is None else [k for k, span in enumerate(self.slices) if which[k] and x[span].any()]
         return self._each([o.apply_schur for o in self.with_springs], x, chosen)

@@ -1,8 +1,8 @@
 """The boundary operators of one subdomain: Schur complement S and flexibility S+, dense or by sparse factors.
 
 S and S+ are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
-factorization gives S.  The dual problem needs only the boundary: the factor is kept only if displacements inside are
-needed.  Sparse factors replace dense matrices that would be too large.
+factorization gives S.  As the dual problem lives on the boundary, the factor is kept only for displacements inside.
+Sparse factors replace dense matrices that would be too large.
 """
 
 from __future__ import annotations
@@ -86,9 +86,9 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix in the lower or upper triangle of the array, with `diagonal` (n,).
+        """Multiply x by the symmetric matrix with `diagonal` (n,) and one triangle of the array, lower or upper.
 
-        Fortran order is fastest.
+        A product is fastest for x in Fortran order.
         """
         A = self._both
         if out is None:
@@ -221,7 +221,7 @@ class Interior:
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
         """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).
 
-        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order; None: the library's.
+        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for the library's.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False

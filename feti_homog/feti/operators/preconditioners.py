@@ -31,7 +31,7 @@ from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):
-    """The product z = M^-1 r for r (owned rows,) or (owned rows, k).  All methods are collective.
+    """A preconditioner z = M^-1 r for r (owned rows,) or (owned rows, k).  All methods are collective.
 
     Attributes:
         is_exact: whether M^-1 is the inverse of the projected dual operator, so that no iterations are needed.
@@ -149,7 +149,7 @@ class SpringUpdate:
         self._places, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """Update the product z = H r, (owned rows,) or (owned rows, k), for the springs; return it.  Collective."""
+        """Return the product z = H r, (owned rows,) or (owned rows, k), updated for the springs.  Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))
@@ -177,7 +177,7 @@ class SpringUpdated(Preconditioner):
         """Update H = `inner` with all rows active; `first` and `compliance` as in `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._intact_compliance = self._compliance = compliance
-        self.is_exact, self.norm = inner.is_exact, inner.norm  # softer springs make |H| smaller
+        self.is_exact, self.norm = inner.is_exact, inner.norm  # springs only reduce |H|
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
     def soften(self, more: Float) -> None:

@@ -30,7 +30,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import NEGLIGIBLE, Load, LoadScales, solve_load, unresisted
 from feti_homog.typing import Bool, Float, Int
 
-# Number of block pivots since the last progress; the literature usually allows ten without progress.
+# Number of block pivots from the last one with progress on; the literature usually allows ten without progress.
 BLOCK_PIVOTS = 11
 # Number of dual problems after which the search gives up; the certificate then shows the errors.
 MAX_CONTACT_SOLVES = 500
@@ -45,7 +45,7 @@ class ContactProblem:
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
         softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
-        block_pivots: number of block pivots without progress after which single nodes change; 0: from the start.
+        block_pivots: number of block pivots, from the last progress on, after which single nodes change; 0: at once.
     """
 
     solver: FetiSolver
@@ -156,7 +156,7 @@ class ContactProblem:
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
-        """Solve for equilibrium under all strains (n, 3) together, at fixed statuses.  Collective."""
+        """Solve for equilibrium under n loads `strains` (n, v) together, at fixed statuses.  Collective."""
         self.prepare(bonds)
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [
@@ -197,7 +197,7 @@ class ContactProblem:
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark the strains (v,) that open faces leave free under prescribed stresses.  Collective."""
+        """Mark strains (v,) that open faces leave free under prescribed stresses; none with friction.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
@@ -211,7 +211,7 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres until all gaps open, and mark open nodes (k,) that squeeze a fibre.  Collective."""
+        """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective."""
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
             return solution, np.zeros(len(bonds.status), bool)
@@ -245,7 +245,7 @@ class ContactProblem:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
         Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and count as open
-        if a fibre is free without these nodes.  The fibre then moves to where its faces part least, if it has room.
+        if a fibre is free without these nodes.  The fibre then moves, if there is room, so that its faces part least.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

@@ -66,10 +66,10 @@ class CoupledInterfaces:
         return load.parts([len(problem.solver.problem.loads) for problem in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
-        """Return the load at the beginning of the leg of a path to waypoint `end`.  Collective.
+        """Return the load at the beginning of the path leg to waypoint `end`.  Collective.
 
-        The load has the values of the waypoint `before`.  Components that change between strain and stress take the
-        values of the last point, `origin`, with 0 for a stress within the solver's error.
+        The load has the values of the waypoint `before`.  Without `before`, or if a component changes between strain
+        and stress, the value comes from the last point, `origin`; a stress within the solver's error counts as 0.
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         pairs = zip(parts, self.problems, strict=False)

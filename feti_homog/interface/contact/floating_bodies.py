@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 # Ratio of gaps to slips below which a rigid motion opens no gap: a round fibre turns.
 LARGEST_GAP_OF_SLIDING = 1e-9
-# Largest motion in a linear programme / largest gap: a fibre may have unlimited room on one side.
+# Largest motion in a linear programme over the largest gap: a fibre may have unlimited room on one side.
 LARGEST_MOTION = 1e3
 # Smallest tolerance of HiGHS, relative to the largest gap; its default of 1e-7 is coarser than the solver's error.
 LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
@@ -45,7 +45,7 @@ class _Fibres:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node, open or not.
-        fibre: (k,) number of the fibre; a fibre and its coating, and neighbouring layers, have one number.
+        fibre: (k,) number of the fibre; a fibre and its coating share a number, and so do neighbouring layers.
     """
 
     is_open: Bool
@@ -87,12 +87,12 @@ class _Fibres:
             amplitudes[columns] += modes @ (result.x[:-1] * scale / size)
             if float(result.x[-1] * scale) < -noise:
                 forces = -result.ineqlin.marginals
-                # The balance does not need smaller forces.
+                # Forces below this fraction of the largest are not needed for balance.
                 squeezes[node[forces > NEGLIGIBLE * forces.max()]] = True
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return both fractions of a step between gaps (k,), as `FloatingBodies.admissible_share`."""
+        """Return both fractions of a step between gaps (k,), see `FloatingBodies.admissible_share`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -139,10 +139,10 @@ class FloatingBodies:
 
         The fractions are the largest w <= 1 for which all fibres have amplitudes a with
 
-            (1 - w) before + w after + M a >= 0,   and with   >= -2 noise:
+            (1 - w) before + w after + M a >= 0,   for the second fraction   >= -2 noise.
 
-        where faces begin to squeeze the first fibre, and where the squeezing is beyond doubt.  Collective, decided on
-        rank 0; raises like `place`.
+        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt.
+        Collective, decided on rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 
@@ -170,8 +170,8 @@ class FloatingBodies:
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
     """Return the fractions of the step at which the first value (k,) reaches 0 and -2 noise.
 
-    Both fractions are 1 if no value falls that far.  Values that end above -2 noise, a number or (k,), may be the
-    solver's error and do not count.
+    Both fractions are 1 if no value falls that far; `noise` is a number or (k,).  Values that end above -2 noise may be
+    the solver's error and do not count.
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
@@ -180,14 +180,14 @@ def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[f
 
 
 def _last_share(before: Float, after: Float, motion: Float, slack: float) -> float:
-    """Maximize 0 <= w <= 1 with (1 - w) before + w after + motion a >= -slack for some amplitudes a."""
+    """Return the largest w in [0, 1] with (1 - w) before + w after + motion a >= -slack for some amplitudes a."""
     scale, size = np.abs([before, after]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (before - after) / scale, (before + slack) / scale, (0.0, 1.0))
     return float(result.x[-1])
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
-    """Maximize x_-1 within bounds, subject to motions x_:-1 + last x_-1 <= limits.
+    """Maximize w within `bounds`, subject to motions a + last w <= limits; the solution is x = (a, w).
 
     Raises:
         ConvergenceError: HiGHS found no solution.

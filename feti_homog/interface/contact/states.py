@@ -86,7 +86,7 @@ class Equilibrium:
         certificate: errors, as returned by `kkt_errors`.
         asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes for
             all loads up to this load.
-        axial: equilibrium along the fibres with these bonds, in generalized plane strain.
+        axial: equilibrium along the fibres with the same bonds, in generalized plane strain; else None.
     """
 
     load: Load
@@ -162,7 +162,7 @@ def kkt_errors(
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
     """Measure the violation (k,) of Coulomb's law.
 
-    The law is |t| <= mu p in stick, and t = s mu p in slip.  Shear along the fibres, without friction, violates it.
+    The law is |t| <= mu p in stick and t = s mu p in slip; along the fibres, without friction, any shear violates it.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

@@ -28,7 +28,7 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Pivots, besides one for each status of each node, after which other searches take over; pivots of a continuation step.
+# Pivots, beyond one per status of every node, after which other searches take over; pivots of a continuation step.
 SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
@@ -98,7 +98,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses: with all or single sliding faces stuck, then by trial."""
+        """Yield other admissible statuses: with all sliding faces stuck, then with one face stuck, then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -125,7 +125,7 @@ class StatusSearch:
                 yield trial, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Raise a fraction of mu to 1, and pivot from the last statuses at each step."""
+        """Raise the friction from zero to mu, and pivot from the last statuses at each step."""
         fraction, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:
@@ -189,7 +189,7 @@ class CoulombFaces(FaceSystem):
         """Find the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
 
         Raises:
-            StuckError: no statuses are admissible, or only statuses with a negative determinant.
+            NotCarriedError, StuckError: as in `search`; StuckError also if the search finds only negative determinants.
         """
         load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
@@ -198,7 +198,7 @@ class CoulombFaces(FaceSystem):
         """Take an implicit step to a load, and return the statuses (n,) and x (m,).
 
         Raises:
-            StuckError: as `rates`.
+            NotCarriedError, StuckError: as in `rates`.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 
@@ -217,7 +217,7 @@ class CoulombFaces(FaceSystem):
         one of these faces slides: both sets of statuses are admissible.
 
         Raises:
-            StuckError: the search found no admissible statuses, or only statuses with a negative determinant.
+            NotCarriedError, StuckError: as in `search`; StuckError also if the search finds only negative determinants.
         """
         status, x = self.search(status, allowed, load, start)
         if self.sign(status, load.by_stress) >= 0:
@@ -241,7 +241,7 @@ class CoulombFaces(FaceSystem):
         return allowed
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
-        """Return the time until a status ends while x changes at `rate`; inf if no status ends."""
+        """Return the time until a node leaves its status while x changes at `rate`; inf if no node does."""
         noise, closed = self.noise(rate), status != OPEN_FACE
         (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
         sticks, last = status == STICK, 2 * self.nodes
@@ -259,7 +259,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy lost on the straight path at constant load, and the part of it that is heat."""
+        """Return the energy lost on the straight path at constant load, and the heat in this energy."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -119,7 +119,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Factor the system of given rows, or return the stored last system."""
+        """Factor the system of given rows; if the last call had the same rows, return its system."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)
@@ -127,7 +127,7 @@ class FaceSystem:
         return self._last[1]
 
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
-        """Solve for x (m,) again without accumulated rounding; keep x if a free motion exists."""
+        """Return the statuses, and x (m,) solved anew without accumulated rounding; with a free motion, x stays."""
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:

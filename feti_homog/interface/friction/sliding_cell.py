@@ -65,7 +65,7 @@ class CondensedProblem:
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
         """Condense the problem to the global rows D.  Collective.
 
-        Return H_DD (n, n) plus springs (n,), b (n, v) and L (v, v).
+        Return H_DD (n, n) with springs (n,) added to the diagonal, b (n, v) and L (v, v).
         """
         self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
@@ -113,7 +113,7 @@ class CondensedProblem:
 class AxialFaces:
     """The part of the matrix S of `coulomb_faces` for the axial problem, with eliminated jumps: g = K^-1 b E.
 
-    A weak spring holds each row: HELD times the row's own diagonal entry of K, as others may be far larger.
+    A weak spring holds each row: HELD times the row's own diagonal entry of K, as other entries may be far larger.
 
     Attributes:
         problem: condensed axial problem.
@@ -137,7 +137,7 @@ class AxialFaces:
 
 
 class SlidingCell:
-    """The debonded faces of a cell, one set of faces at a time.
+    """The debonded faces of a cell; every call of `take` replaces the set of faces.
 
     Attributes:
         interface: plane contact problem.
@@ -269,7 +269,7 @@ class SlidingCell:
             asked.append(np.max([scale.asked(load) for load in problem_loads], axis=0))
         # Rounding in an unloaded problem is as large as in the loaded problem.
         largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
-        # The jumps in friction come from x: the jumps of F lambda would be divided by a vanishing compliance.
+        # Forces of springs come from the jumps in x: jumps by F lambda would be divided by a vanishing compliance.
         acting, jumps = list[Float](), list[Float]()
         for problem_loads, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)

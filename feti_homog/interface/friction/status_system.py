@@ -33,7 +33,7 @@ STICK, FORWARD, OPEN_FACE, BACKWARD = FaceStatus
 # Stiffness, relative to the stiffness of a node, that holds free motions; iterative refinement removes its effect.  A
 # residual up to this fraction of the terms of its row drives no free motion.
 HELD = 1e-9
-# Pivot size below which a pivot belongs to a free motion, with a sign from rounding.
+# Pivot size below which a pivot belongs to a free motion; its sign is then rounding.
 LEAST_PIVOT = 1e-6
 # SOFT_PIVOT: pivot size below which inverse iteration searches for free motions.  MORE_MOTIONS: number of vectors
 # beyond the number of soft pivots.  INVERSE_ITERATIONS: number of iterations, each of which reduces stiff motions by
@@ -107,7 +107,7 @@ class StatusSystem:
     def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
         """Solve for x (m,), and return whether x is a solution.
 
-        The start x holds the prescribed entries, and free motions keep their amplitude in x.  If the right-hand side
+        The start x holds the prescribed entries, and the amplitudes that free motions keep.  If the right-hand side
         `rhs` (m,) drives a free motion, no solution exists: springs of stiffness HELD bear the forces.
         """
         start, x = x, x.copy()
@@ -122,7 +122,7 @@ class StatusSystem:
             x[self.free] += lu_solve(self._factor, missing, check_finite=False)
         if not self._free_motions.shape[1]:
             return x, True
-        # Where forces balance, rounding divided by HELD has driven free motions, which depend on the number of ranks.
+        # Where forces balance, rounding / HELD has driven free motions by amounts that depend on the number of ranks.
         stays = x.copy()
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
         # A row without any stiffness, such as shear along sliding fibres, has the rounding of other rows.
@@ -169,7 +169,7 @@ class FollowedStatuses:
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Exchange all rows that differ; return False if a pivot is too small."""
+        """Exchange all rows of M that differ from the arguments; return False if a pivot is too small."""
         pending, size = np.flatnonzero((free != self.free) | (slope != self.slope)).tolist(), self._size
         while pending:
             failed = []

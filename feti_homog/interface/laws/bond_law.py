@@ -64,7 +64,7 @@ class BondLaw(ABC):
     Attributes:
         has_toughness: whether bonds have a fracture energy, see `fracture`.
         has_tips: whether results compare the fracture energy with the energy release rates at debonding tips.
-        is_convex: whether `share` is convex, so that the utilisation passes 1 once on a straight path.
+        is_convex: whether `share` is convex, so that the utilisation rises through 1 at most once on a straight path.
         break_names: column names in `breaks`, for tractions with two or three components.
     """
 
@@ -77,7 +77,7 @@ class BondLaw(ABC):
     def share(self, traction: Float) -> Float:
         """Return the utilisation (p,) of bonds under tractions (p, c); a bond breaks at 1.
 
-        The c components are normal, positive in tension, tangential and, if c = 3, along the fibre.  The utilisation is
+        The c components are normal (positive in tension), tangential and, if c = 3, axial.  The utilisation is
         homogeneous of degree one.
         """
 
@@ -96,7 +96,7 @@ class BondLaw(ABC):
         return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
-        """Return the internal variables (k, h) of `k` intact bonds."""
+        """Return the initial internal variables (k, h) of `k` intact bonds."""
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
@@ -178,7 +178,7 @@ class BondLaw(ABC):
 class SpringLaw(BondLaw):
     """A law for bonds that break at a certain energy of the undamaged springs.
 
-    A traction along the fibre adds to the slip energy, because all shear counts alike.
+    A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 
     Attributes:
         normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.

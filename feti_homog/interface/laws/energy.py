@@ -2,12 +2,12 @@
 
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 
-At a debonding tip the released energy is decisive.  The spring energy of a tip falls with the length of the tip's node,
-so that a criterion by spring energy depends on the mesh; a criterion by the released energy does not.  With H the
+At a debonding tip the released energy is decisive.  The spring energy at a tip falls with the tributary length of the
+node, so a criterion by spring energy depends on the mesh; a criterion by released energy does not.  With H the
 inverse of the dual operator on the active rows, a break of bond i parts the faces by j = H_ii^-1 lam_i, and the energy
 of the cell falls, at constant strain, by
 
-    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, so that the normal force stays.
+    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, and therefore keep the normal force.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return the factor sqrt(G_Ic / G_c) (p,) of the modes of tractions (p, c)."""
+        """Return the factor sqrt(G_Ic / G_c) (p,) under tractions (p, c), which determine the modes."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
@@ -76,7 +76,7 @@ class SpringEnergy(SpringLaw):
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """Return the toughness G_c (p,) in the modes of tractions (p, c), an energy per area."""
+        """Return the toughness G_c (p,), an energy per area, under tractions (p, c), which determine the modes."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
@@ -91,7 +91,7 @@ class TipEnergies:
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
-        stiffness: (t, c) upper bounds of H, as `ExactInverse.stiffness`.
+        stiffness: (t, c) upper bounds for the diagonals of H and `axial`, see `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without an axial problem.
     """
 
@@ -191,7 +191,7 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return False (p,) at tips, where the released energy need not be subadditive."""
+        """Return whether `share` is convex (p,): not at tips, where the released energy need not be subadditive."""
         return np.asarray(self.number < 0)
 
 

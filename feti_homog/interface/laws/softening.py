@@ -30,7 +30,7 @@ from feti_homog.typing import Bool, Float, Int
 
 # Largest number of teeth that the program chooses.
 MOST_TEETH = 10_000
-# The last tooth begins where an exponential traction has fallen to this fraction of the peak.
+# Teeth divide an exponential branch down to this fraction of the peak; the last tooth takes the remaining energy.
 EXPONENTIAL_TAIL = 0.01
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
            "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip
@@ -84,8 +84,8 @@ class CohesiveLaw(SpringLaw):
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
         """Choose the damage levels between the teeth.
 
-        Openings have a constant ratio in the pure mode of the largest G_c / W_0.  By default the number of teeth is the
-        smallest one for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
+        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  The default of `teeth`
+        is the least number for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
 
         Raises:
             CaseError: more than MOST_TEETH teeth are necessary.
@@ -120,7 +120,7 @@ class CohesiveLaw(SpringLaw):
     @property
     @abstractmethod
     def last(self) -> float:
-        """The argument u at which the last tooth ends, or takes the remaining energy."""
+        """The argument u at the end of the last tooth, which takes all energy that remains."""
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
@@ -256,12 +256,12 @@ class PiecewiseLinear(CohesiveLaw):
 
 @dataclass(frozen=True)
 class BilinearLaw(PiecewiseLinear):
-    """The traction falls in a straight line."""
+    """A law with a traction that falls in a straight line."""
 
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law with a table of traction over opening in mode I, stretched to the toughness of other modes."""
+    """A law with a table of traction over opening in mode I, stretched to match the toughness in other modes."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:

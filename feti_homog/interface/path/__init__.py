@@ -1,4 +1,4 @@
-"""Load paths: from event to event, onsets of breaks, and later legs.
+"""Follow load paths from event to event or in equal steps, and find the onsets of breaks.
 
 Imports `feti`, `interface`, `interface.contact`, `interface.friction`, `interface.laws` and `system`.  Main entry:
 `path_following`.

@@ -1,6 +1,6 @@
 """Path legs with friction on debonded faces: linear pieces between changes of status and breaks of bonds.
 
-One of several equal load steps is implicit: slips grow with the sign of the final traction.  As the path within a step
+Equal load steps, in contrast, are implicit: slips grow with the sign of the final traction.  As the path within a step
 is unknown, the heat is the work of final forces on slips; the work of the loads is stored, released or heat.
 """
 
@@ -23,7 +23,7 @@ from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
-# Least fraction of a leg between the last point and a change of statuses that is a point, too.
+# Least fraction of a leg between the last point and a change of statuses that becomes a point.
 LEAST_SHARE = 0.01
 # Changes at one load that count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
@@ -115,7 +115,7 @@ class CoulombLeg(Leg):
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Advance along the rates up to and past the next change.
+        """Advance along the rates to the next change of statuses, to the first break, or to the end of the leg.
 
         Raises:
             NotCarriedError: the cell carries no more load; the last point is at the largest load.

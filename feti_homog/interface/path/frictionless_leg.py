@@ -103,7 +103,7 @@ class FrictionlessLeg(Leg):
             self._stand(beyond, touching)
             self._false_alarm = False
             return
-        # Fractions of the leg at which a bond breaks, contact begins to change, and surely has; or inf.
+        # Fractions of the leg at which a bond breaks, contact begins to change, and contact surely has changed; or inf.
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
         begins, certain = (np.inf, np.inf) if begins == 1.0 else (begins, certain)
@@ -167,7 +167,7 @@ class FrictionlessLeg(Leg):
         return reached
 
     def _response(self, state: Macroscopic) -> Float:
-        """Return the components (n,) that the load does not prescribe: stresses, and strains times a stiffness."""
+        """Return the components (n,) that the load does not prescribe: stresses, or strains times a stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _turn(self, position: float) -> Point:

@@ -19,13 +19,13 @@ SAME_SHARE = 1e-9
 
 
 class Leg(ABC):
-    """The leg number `leg` of a path, at a fraction s that rises from 0 to 1.
+    """Leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
     The loads at s = 0 and s = 1 prescribe the same components as strains and as stresses.  Bonds break at constant
-    load: a point of the path, then the state after the break at the same s.
+    load: the state before a break is a point, and the path continues from the state after the break at the same s.
 
     Attributes:
-        limit: error that ended the last step before its load, or None.
+        limit: error that stopped the last step short of its load, or None.
     """
 
     limit: NotCarriedError | None = None
@@ -68,7 +68,7 @@ class Leg(ABC):
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
     def step(self, number: int, steps: int, worst_only: bool) -> path_points.Point:
-        """Return the point after the path's step `number`, from 1.  Collective."""
+        """Return the point after step `number` of the path, with numbers from 1.  Collective."""
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
         first = self._used()[0]

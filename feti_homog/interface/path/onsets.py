@@ -80,7 +80,7 @@ class Onset:
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
     """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once, where bisection finds it.
+    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds.
     Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED

@@ -4,8 +4,8 @@
 degree one: one solve gives the load of the next break, which may be lower than the last load (snap-back).  Later legs
 control the load, see `leg`.  `increments` is the paper's loop.
 
-Energy.  A break happens at constant load, at which stresses or strains jump, and releases work minus stored energy;
-between breaks no energy is lost.  The `energies` of a point count from the last point.
+Energy.  A break happens at constant load: stresses or strains jump, and work minus the change of stored energy is
+released.  Between breaks, only friction loses energy.  The `energies` of a point count from the last point.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +32,7 @@ def events(
     `broke` = 0: between points the response is straight.  A point without convergence is the last one.
 
     Raises:
-        NotCarriedError: the last point is the load limit.
+        NotCarriedError: the cell carries no more load; the last point is at the largest load.
     """
     for leg in range(begin.leg, len(waypoints)):
         if leg == 0 and engine is FrictionlessLeg:
@@ -59,8 +59,8 @@ def increments(
     """Yield the points of the paper's loop, which breaks all overloaded bonds at equal load steps.  Collective.
 
     The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only`, only the
-    worst bonds break at a time.  A point without convergence is the last one; with friction the last point may be
-    at the largest load that the cell carries.
+    worst bonds break between two solves.  A point without convergence is the last one; with friction, the last point
+    may be at the largest load that the cell carries.
 
     Raises:
         NotCarriedError: the cell carries no more load, or a step has no admissible statuses.

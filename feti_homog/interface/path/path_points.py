@@ -25,8 +25,8 @@ class PathState:
         bonds, lam: initial bond states and multipliers.
         origin: state at the beginning of the leg.
         last: state at the last point.
-        broken: fracture energy per area at the last point, by the mode in which each bond broke, 0 without toughness;
-            None without a break.
+        broken: fracture energy per cell area of the bonds that broke at the last point, with a toughness for the mode
+            of each break; 0 without toughness, None without a break.
         stretched: with friction, energy per area in the springs of damaged bonds, before this break.
     """
 
@@ -95,9 +95,9 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) of an equilibrium, whatever their tractions.  Collective.
+    """Break the bonds `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
 
-    Return how many bonds part and how many soften, over all ranks, and the path state `place` after the break.
+    Return the numbers of bonds that part and that soften, over all ranks, and the path state `place` after the break.
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)
@@ -126,5 +126,5 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
 
 
 def count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
-    """Count the nodes where `which` (k,) is true on all ranks.  Collective."""
+    """Count the nodes of all ranks where `which` (k,) is true.  Collective."""
     return int(cell.comm.allreduce(int(which.sum())))
