@@ -184,7 +184,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     work, stored, springs, lost, fracture, heat = (_column(points, name, rising) for name in names)
     if rising is not None:
         lost = _column(points, "dissipated_strain_controlled", rising)
-        work = stored + lost
+        work = stored + lost + heat
     fracture = np.minimum(fracture, lost)
     rest = "other losses in breaks" if fracture.any() else "lost in breaks"
     # The sum of the parts is the work, except for rounding.

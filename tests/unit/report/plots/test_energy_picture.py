@@ -72,7 +72,7 @@ def test_energies_at_rising_loads_and_results_without_energies() -> None:
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
     assert {1.0, 2.0} <= {*place} and (np.diff(place) >= 0.0).all()
-    # One leg: the load 0.5 is reached on a branch that stores 2 at the load 1, a quarter of it at 0.5; 3.5 are lost.
+    # One leg: the load 0.5 is reached on a branch that stores 2 at the load 1, a quarter of it at 0.5; 3.5 are lost, 2.5 are heat.
     document = path([0.5, 0.25, 1.0], **ENERGIES | {"stored": [4.0, 1.0, 2.0], "stored_in_springs": [0.0] * 3})
     document["case"]["path"]["waypoints"].pop()
     for point, lost in zip(document["path"], (0.0, 3.0, 3.5), strict=True):
@@ -80,7 +80,8 @@ def test_energies_at_rising_loads_and_results_without_energies() -> None:
     figure = path_picture.energies(document)
     assert figure is not None
     strains, work = figure.axes[0].lines[0].get_data()
-    np.testing.assert_allclose(work[strains == 0.01], [4.0, 2.0 / 4.0 + 3.5])
+    np.testing.assert_allclose(work[strains == 0.01], [4.0, 2.0 / 4.0 + 3.5 + 2.5])
     assert figure.axes[0].get_xlabel() == "macroscopic strain $E_{11}$" and strains[-1] == 0.02
-    assert work[-1] == 5.5
+    top = figure.axes[0].collections[-1].get_paths()[0].vertices
+    assert work[-1] == 8.0 and any(np.allclose(corner, [0.02, 8.0]) for corner in top)
     assert path_picture.energies(path([0.5, 0.6, 1.0])) is None
