@@ -89,11 +89,11 @@ def _read_material(
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:
             given.setdefault(form, []).append(name)
-    is_bare = isinstance(table, dict) and "conductivity" in table
-    forms = list(given) or ["conductor" if is_bare else "isotropic"]
+    forms = list(given) or ["conductor" if isinstance(table, dict) and "conductivity" in table else "isotropic"]
     if len(forms) > 1:
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
-        reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
+        way = laws.OF_DATA_SHEETS if "orthotropic" in forms else "a material is of one kind"
+        reader.faults.append(f"[{section}] {groups}: exclude each other; {way}")
         return None
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:

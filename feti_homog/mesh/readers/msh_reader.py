@@ -229,7 +229,6 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     if not faults:
         return []
     faults[-1] += f"; {known_names(mesh)}"
-    # Propose the two largest groups for [cell.phases].
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
@@ -238,7 +237,8 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
                 shares[group[0]] = shares.get(group[0], 0.0) + percent
     if shares:
         largest = [_as_selected(name) for name in sorted(shares, key=lambda name: -shares[name])]
-        entries = ", ".join(f"{phase} = {name}" for phase, name in zip(("matrix", "fibre"), largest, strict=False))
+        proposed = ["matrix", "fibre", *(f'"fibre:{k}"' for k in range(2, len(largest)))]
+        entries = ", ".join(f"{phase} = {name}" for phase, name in zip(proposed, largest, strict=False))
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
         faults[-1] += f". If {largest[0]} is the matrix, add to [cell]: phases = {{{entries}}}. "
         faults[-1] += f"Shares of the area: {listed}"
