@@ -1,4 +1,4 @@
-"""`feti-homog sweep`, `collect`, `fit` and `uncertainty`: many cases, constants from them, result scatter."""
+"""`feti-homog sweep`, `collect`, `fit` and `uncertainty`: run many cases, fit constants, propagate scatter."""
 
 import argparse
 

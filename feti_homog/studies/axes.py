@@ -114,7 +114,7 @@ def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, or an empty string; sampled ranges need no step and no count."""
+    """Return the fault of an axis, or an empty string; sampled ranges need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"

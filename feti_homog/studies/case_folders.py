@@ -1,4 +1,4 @@
-"""The sweep folder: its case list, a folder for each case, and their progress.
+"""Manage the sweep folder: the case list, a folder for each case, and the progress of the cases.
 
 DIR/sweep.json, cases.csv     the cases; `feti-homog collect` adds the results to cases.csv
 DIR/case-0001/case.toml       the case with its defaults, as `feti-homog run` reads it

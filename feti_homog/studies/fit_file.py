@@ -1,4 +1,4 @@
-"""Read a fit file: a case with unknown constants, and measured values; and report all faults."""
+"""Read a fit file, a case with unknown constants and measured values, and report all faults."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field

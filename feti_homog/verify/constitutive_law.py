@@ -1,4 +1,4 @@
-"""The stiffness of every phase, from the constants of the case by the three-dimensional compliance."""
+"""Compute the stiffness of every phase from the constants of the case, by the three-dimensional compliance."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -53,7 +53,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
-    """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
+    """Return for each phase (phases,) whether its quadratic elements have a bubble and a pressure.
 
     Elements of isotropic phases are mixed, except in plane stress and conduction.  In an isotropic phase one modulus
     and one ratio give all constants, up to rounding.  Raises like `laws`.
@@ -70,7 +70,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return n eps times the ratio of volumetric to least compliance, and times the contrast of the stiffnesses."""
+    """Return 6 eps times the largest ratio of volumetric to least compliance, and times the stiffness contrast."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # of an incompressible phase, pressures have own limits
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
@@ -109,7 +109,7 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Return the constant `stiffness`, (3, 3) or (6, 6); (0, 0) if it is missing."""
+    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6); an empty array (0, 0) without it."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 

@@ -1,4 +1,4 @@
-"""Triangles with three or six nodes, for the certificate alone: displacements to strains, stresses and forces.
+"""Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
 
 Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
 orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a = r_a, or
@@ -17,7 +17,7 @@ from feti_homog.verify.reading import Mesh
 ELEMENTS_AT_ONCE = 1 << 15
 # (c, 2) position of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
-# r_a is the sum of N_a and half of N_b of the middle nodes b on both sides at vertex a.
+# r_a is N_a plus half of N_b for the middle nodes b of both sides at vertex a.
 OF_NODES = np.array([[2, 0, 0, 1, 0, 1], [0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
 # Components of normal stresses, by the number of stresses.
 NORMAL = {3: [0, 1], 6: [0, 1, 2]}

@@ -5,15 +5,15 @@ the next line, G23, where nu_ij is the strain along j under stress along i; TYPE
 D_ijkl of `ABAQUS_ENTRIES`, eight to a line.  Numbers have up to 20 characters (Input syntax rules).
 
 CalculiX CrunchiX user's manual, *ELASTIC and *EXPANSION; fields of 20 characters are read.  Its alpha12, alpha13,
-alpha23 are the tensor's shears, half of the engineering ones.
+alpha23 are the tensor's shears, half the engineering shears.
 
 ANSYS Material Reference, linear elasticity: PRXY, PRYZ, PRXZ are the major Poisson's ratios, PRXY = -eps_y/eps_x under
 stress along x; TB,ANEL takes the lower triangle of the stiffness (TBOPT = 0) by columns, in the order [x, y, z, xy, yz,
 xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; shears have none.
 
-MOOSE: ComputeElasticityTensor takes C_ijkl: of `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
-of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
-components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
+MOOSE: ComputeElasticityTensor takes C_ijkl: for `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
+for `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12]. ComputeEigenstrain takes the
+components 11, 22, 33, 23, 13, 12 of a tensor, with half the engineering shears.
 """
 
 from collections.abc import Callable, Iterable
@@ -50,7 +50,7 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 def abaqus(material: effective_material.EffectiveMaterial) -> str:
     """Return the Abaqus card.  Raises CaseError for an expansion with shears."""
-    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
+    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering shear.
     _refuse_shears(material, "which cards for Abaqus do not carry")
     return _keyword_card(material, "ANISOTROPIC")
 

@@ -1,4 +1,4 @@
-"""The mesh in result.h5, coarsened for pictures, with its fields.
+"""Read the mesh of result.h5, coarsened for pictures, and its fields.
 
 The coarse mesh has at most TRIANGLE_LIMIT triangles where the nesting allows; the file is read in blocks.
 """

@@ -1,4 +1,4 @@
-"""Pictures of the deformed cell along an angle or a path: panels side by side and an animation, in one colour range."""
+"""Draw the deformed cell at several angles or along a path: panels and an animation, in one colour range."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Choose one stress component and one colour range for all given states.
 
-        The case may name the component; otherwise the component suits all states, or a path its peak.
+        The case may name the component; by default all states determine the component, on a path its peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
@@ -56,7 +56,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
         colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
         if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
-            # At the end, once all fibres have come off, stresses may be many times those before.
+            # At the end, after all fibres have debonded, stresses may be many times larger than before.
             before, end = (plot_helpers.colour_range(part, areas) for part in (stress[:-1], stress[-1]))
             if np.abs(end[0].inverse([0.0, 1.0])).max() > 2.0 * np.abs(before[0].inverse([0.0, 1.0])).max():
                 colours, mark_of = before, mark_of | {max(mark_of): OWN_COLOURS}

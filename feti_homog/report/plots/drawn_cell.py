@@ -1,4 +1,4 @@
-"""The cell in pictures: triangles, frame with a colour bar, interface, and load labels."""
+"""Draw the parts of cell pictures: triangles, frame with a colour bar, interface, load labels."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class InterfaceEdges:
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
         """Find the interface edges among the body outlines.
 
-        All periodic images of an interface node have one row in /interface.
+        All periodic images of an interface node share one row in /interface.
         """
         points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
         if not len(points):
@@ -79,7 +79,7 @@ class InterfaceEdges:
             segments = points[self.edges[states == kind]]
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
             if kind != BONDED:
-                # This ink shows on every colour; magenta and orange vanish on red.
+                # A white edge shows on every colour; magenta and orange vanish on red.
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
             tenths = np.ceil(10.0 * damage[states == kind]) if kind == DAMAGED else np.ones(len(segments))
             for tenth in np.unique(tenths):

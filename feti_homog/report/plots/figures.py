@@ -1,4 +1,4 @@
-"""All pictures of a result folder; each module of this package is loaded only for results with its pictures."""
+"""Draw all pictures of a result folder; load each module of this package only for results with its pictures."""
 
 from pathlib import Path
 from typing import Any

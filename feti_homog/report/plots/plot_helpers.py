@@ -1,4 +1,4 @@
-"""Helpers of all pictures: style, triangles and lines, colour ranges, labels."""
+"""Provide helpers for all pictures: style, triangles and lines, colour ranges, labels."""
 
 import math
 import warnings
@@ -116,7 +116,7 @@ def finish_curves(*panels: Axes) -> None:
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
-    """Add a legend below the axes, in as many columns as the figure is wide, at most `limit`."""
+    """Add a legend below the axes, in as many columns as fit into the figure, at most `limit`."""
     for columns in range(min(len(handles), limit), 0, -1):
         legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:

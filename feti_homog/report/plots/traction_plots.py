@@ -1,4 +1,4 @@
-"""interface.png: tractions and jumps around the fibres."""
+"""Draw interface.png: tractions, jumps and damage around the fibres."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NAMES = {
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw tractions, jumps and damage around the most debonded or damaged, else most loaded fibres, one per row."""
+    """Draw tractions, jumps and damage, one fibre per row: the most debonded or damaged, else the most loaded."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED
@@ -130,7 +130,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
             values = np.column_stack([values, axial])
         values = values.reshape(len(values), -1)
         values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
-        # The curve closes if the gap between the last and the first node is less than twice the other gaps.
+        # The curve closes if the gap between the last and the first node is less than twice the largest other gap.
         if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
             at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])
             values = np.concatenate([values[-1:], values, values[:1]])

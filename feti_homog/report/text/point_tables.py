@@ -1,4 +1,4 @@
-"""Tables of an angle, a load or an envelope, and of energy release rates at tips."""
+"""Build the tables of an angle, a load or an envelope, and of energy release rates at tips."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -146,7 +146,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return tables of the largest G for each angle and load; a single load has all numbers of the tip."""
+    """Return tables of the largest G for each angle and load; for a single load, with all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

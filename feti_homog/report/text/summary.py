@@ -1,4 +1,4 @@
-"""The printed summary of a result.json, tables for notebooks, and the registry of reported analyses.
+"""Write the summary of a result.json and tables for notebooks; register the reported analyses.
 
 Modules of pictures find an analysis by its name: `response_curves.CURVES`.
 """
@@ -25,12 +25,12 @@ STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "
 
 @dataclass(frozen=True)
 class ReportedAnalysis:
-    """An analysis for the reports; its entry in result.json has its name, except for the stiffness.
+    """An analysis in reports; its entry in result.json has the same name, except for the stiffness.
 
     Attributes:
         title: the name in words.
         is_curve: whether the states are points of a curve, shown side by side.
-        is_followed: whether first and last states matter most.
+        is_followed: whether the states follow a load path, so that landmarks choose among them.
         picture: name of the picture of a state; "": the picture has the name of the unit load.
     """
 
