@@ -204,7 +204,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove the result files whose names are not in `written`, and events without a log.  Call on one rank."""
+    """Remove the result files whose names are not in `written`, and events if no log is written.  Call on one rank."""
     if LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

@@ -1,4 +1,4 @@
-"""The table of a sweep: inputs, outputs and results of all cases, with statistics over realisations."""
+"""Tabulate a sweep: inputs, outputs and results of all cases, with statistics over realisations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -115,7 +115,7 @@ class SweepTable:
         for key in varied:
             if (value := self.input_of(point, key)) is None:
                 continue
-            # Without its section, but with a material's phase and an interface's number.
+            # A key loses its section, but keeps a material's phase and an interface's number.
             section, _, rest = key.partition(".")
             name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
             name = name.replace(".", " ").replace("_", " ")
@@ -145,7 +145,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points that differ by one key only; `x` are the rising values of the key."""
+    """A series of sweep points that differ by one key only; `x` has the ascending values of the key."""
 
     label: str
     points: list[int]

@@ -83,7 +83,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     if faults:
         return Uncertainty({})
     result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
-    # The rounding error of an eigenvalue is at most the matrix order times the norm, which the order bounds.
+    # The rounding error of an eigenvalue is at most n eps times the norm, which is at most the order n.
     if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
         place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
         faults.append(f"{place}: these correlations are impossible; expected a positive semidefinite matrix")
@@ -125,7 +125,7 @@ def _means(
     elif not deviation > 0:
         faults.append(f"[{wording.dotted_key(path[:-1])}] {path[-1]} = {wording.toml_value(value)}: {EXPECTED}")
     else:
-        # A pair of entries of a symmetric stiffness is one number, Cij as for its derivatives.
+        # Two symmetric entries of a stiffness are one number, with the name Cij, as in derivatives.
         entry = ((*path[:-2], "C" + "".join(sorted(path[-2:]))) if is_entry else path, deviation)
         given += [] if is_entry and entry in given else [entry]
     return value["mean"]

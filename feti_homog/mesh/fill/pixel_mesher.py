@@ -1,4 +1,4 @@
-"""The coarse mesh of a label image: its pixels, or regions within smooth outlines."""
+"""Make the coarse mesh of a label image: from its pixels, or from regions within smooth outlines."""
 
 import numpy as np
 

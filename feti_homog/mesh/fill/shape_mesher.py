@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a cell with any convex outlines, which gmsh cuts at the cell sides and fills.
+"""Mesh a periodic cell with any convex outlines, which gmsh cuts at the cell sides and fills.
 
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """

@@ -1,4 +1,4 @@
-"""The edge sizes on the cell lines, smaller on circles and at debond tips."""
+"""Compute the edge sizes on the cell lines, smaller on circles and at debond tips."""
 
 from __future__ import annotations
 

@@ -178,7 +178,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
                 break
     if not only_groups:
         return content
-    # Other programs write only physical groups: a group stands for an entity.
+    # Some other programs write only physical groups: a group then stands for an entity.
     return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
 
 

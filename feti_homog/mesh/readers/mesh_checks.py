@@ -12,9 +12,9 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Float, Int, Int32
 
-# Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
+# Number of coincident pairs below which all pairs are listed: pairs grow with the square of the nodes.
 MOST_PAIRS = 1000
-# Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.
+# Limit for pairs of an edge and a nearby node, whose number may also grow with the square.
 MOST_CANDIDATES = 10**7
 # Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
@@ -136,7 +136,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 
 
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes that lie within inner edges with a single triangle.
+    """List nodes that lie on inner edges with a single triangle.
 
     `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
     """

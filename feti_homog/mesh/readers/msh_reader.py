@@ -45,7 +45,7 @@ def read(
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
-    The file, of a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
+    The file, with a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
     "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`, and opposite
     sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are debonded
     from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses (`with_ellipses`);
