@@ -190,7 +190,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_classes(torus: Torus) -> Int:
-    """Return the keys of the pinned classes: one class, all on sides that move by E x, or none with tractions.
+    """Return the keys of the pinned classes: one class, all classes on sides that move by E x, or none with tractions.
 
     The one class of a periodic cell, Eq. (15), lies inside the matrix, nearest to a corner. On an interface, it would
     join both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts u*.
@@ -264,7 +264,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
-    """Join submeshes; identify classes and torus edges, but no plane vertices and plane edges."""
+    """Join submeshes; identify classes and torus edges, but neither plane vertices nor plane edges."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     _, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = np.concatenate([mesh.class_keys[mesh.pinned] for mesh in meshes])
@@ -287,6 +287,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Concatenate the index arrays `name`, each shifted by the number of `of` entries before."""
+    """Concatenate the index arrays `name`, each shifted by the number of `of` entries in earlier parts."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

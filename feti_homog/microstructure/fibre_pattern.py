@@ -1,4 +1,4 @@
-"""Patterns of round fibres in a rectangle: a periodic cell, or a window of a micrograph."""
+"""Represent patterns of round fibres in a rectangle: a periodic cell, or a window of a micrograph."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -81,7 +81,7 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Read the fibre pattern of a window, at least two fibres, from a table.
+    """Read the fibre pattern of a window, with at least two fibres, from a table.
 
     `size` is the width and height of the window, by default the size in the table. The lower left corner is `left` and
     `bottom` of the table, by default 0. Ellipses count as equal-area discs; voids are excluded.

@@ -13,9 +13,9 @@ from feti_homog.schema import types, wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Array, Int32
 
-# Modes of Pillow with several numbers a pixel: how many are colours.
+# Modes of Pillow with several numbers per pixel, and how many of these are colours.
 COLOURS = {"LA": 1, "RGB": 3, "RGBA": 3}
-# Modes of Pillow with one whole number a pixel: bits, palettes, 8, 16 and 32 bits.
+# Modes of Pillow with one whole number per pixel: bits, palettes, 8, 16 and 32 bits.
 WHOLE_NUMBERS = {"1", "P", "L", "I", "I;16", "I;16B", "I;16L", "I;16N"}
 
 
@@ -26,7 +26,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, in a line each.
+        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, one per line.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)

@@ -102,7 +102,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
     Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
-    chord. A triangle with two edges on one curve flips an edge: the curve has no corner between them.
+    chord. In a triangle with two edges on one curve, one flips: the curve has no corner there.
     """
     torus, nodes = Torus.of(mesh), len(mesh.points)
     pairs = torus.low_copies(torus.is_outline)

@@ -1,9 +1,9 @@
-"""The matrix between discs as faces of a planar graph, whose lines are bridges and cell sides.
+"""Represent the matrix between discs by the faces of a planar graph, whose lines are bridges and cell sides.
 
 A bridge is a straight line across the matrix between the facing points of neighbouring discs, normal to both circles.
 In a narrow gap, a bridge is about as long as the edges of the mesh, and allows good triangles.
 
-The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from either end.
+The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from each end.
 A half-line leaves a disc in the direction of the start point on the circle.
 """
 
@@ -135,7 +135,7 @@ class HalfLines:
         """
         node, start = nodes.T.ravel(), np.concatenate([starts[:, 0], starts[:, 1]])
         other = np.concatenate([starts[:, 1], starts[:, 0]])
-        # At a corner, the start point is the centre: the direction is that of the other end.
+        # At a corner, the start point is the centre: then the other end gives the direction.
         offset = np.where(np.all(start == centres[node], axis=1)[:, None], other, start) - centres[node]
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
@@ -186,7 +186,7 @@ def matrix_tiles(
 ) -> MatrixTiles | None:
     """Distribute the matrix faces to the cells of a grid (2,) by centroids.
 
-    None if a disc, or a group of discs without bridges to the sides, has no face.
+    Returns None if no centre line assigns a disc, or a group of discs without bridges to the sides, to a face.
 
     Args:
         circles: (k, 3) centres and radii.

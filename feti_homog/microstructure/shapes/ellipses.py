@@ -1,4 +1,4 @@
-"""Discs, and ellipses as affine images of the unit circle: points, tangents, curvature and distances."""
+"""Represent discs, and ellipses as affine images of the unit circle: points, tangents, curvature, distances."""
 
 from __future__ import annotations
 
