@@ -104,7 +104,7 @@ def read(source: Path) -> ListedFibres:
 
 
 def _of_result(directory: Path) -> ListedFibres:
-    """Read the fibres of a result, from its case if the result lacks voids or outlines."""
+    """Read the fibres of a result, or of its case if the result lacks voids or outlines."""
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
     is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in fibres) and not cell.get("porosity")

@@ -1,4 +1,4 @@
-"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: products of a result."""
+"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: make the products of a result."""
 
 import argparse
 import os
@@ -41,7 +41,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the result states to files for VTK."""
+    """Write the states of a result to VTK files."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)

@@ -44,7 +44,7 @@ class Submesh:
         edge_class: (e,) torus edge of each plane edge.
         at_void: (torus edges,) whether a torus edge bounds a void, with only one triangle in the whole cell.
         debonded: (torus edges,) whether a torus edge is debonded from the start.
-        touching: (classes,) as `Torus.touching`.
+        touching: (classes,) as in `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
         pinned: local numbers of the classes that do not move: one class, against translations of the cell, Eq. (15),
@@ -95,7 +95,7 @@ class SubdomainTable:
     Attributes:
         body: (s,) constituent that contains each subdomain; 0 for subdomains across materials.
         rank: (s,) rank of each subdomain.
-        nesting: (constituents,) position in the order from the outermost to the innermost, as `Torus.nesting`.
+        nesting: (constituents,) position in the order from the outermost to the innermost, as in `Torus.nesting`.
         phase: (constituents,) number of the material phase.
         across: whether subdomains extend across materials.
     """

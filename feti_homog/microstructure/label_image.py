@@ -23,7 +23,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     """Read an image, and replace its labels by phases.
 
     Returns the phase numbers (rows, columns), the lowest row first, and the phase names, the matrix first, others in
-    order, voids last. `is_mirrored` puts the mirror images beside and above the image.
+    alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
         CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, one per line.

@@ -60,7 +60,7 @@ BEGUN = (Status.RUNNING, Status.INTERRUPTED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason for it, and the content of result.json or of an unfinished path."""
+    """The progress of a case, the reason, and the content of result.json or of an unfinished path."""
 
     status: Status
     reason: str = ""

@@ -62,7 +62,7 @@ class ParameterEstimates:
 
     @property
     def influence(self) -> Float:
-        """The change of each estimate per standard deviation of each datum, (n, m)."""
+        """The changes (n, m) of the estimates per standard deviation of the data."""
         size, V = _sizes(self.x), self.directions[: self.rank]
         pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
@@ -93,7 +93,7 @@ class ParameterEstimates:
 
     @property
     def shares(self) -> Float:
-        """The fraction of the variance of each estimate that each datum contributes, (n, m)."""
+        """The fractions (n, m) of the variances of the estimates that the data contribute."""
         squares = self.influence**2
         total = squares.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))

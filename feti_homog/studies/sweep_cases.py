@@ -72,7 +72,7 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     """Expand a document with a table "sweep" into its cases.
 
     The cases run through all points before the next realisation, so that more realisations add cases at the end.
-    File names in the document are relative to `folder`.  Raises CaseError as `load`.
+    File names in the document are relative to `folder`.  Raises CaseError like `load`.
     """
     document = toml_files.to_document(values)
     if sections.SWEEP not in document:

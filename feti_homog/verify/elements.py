@@ -29,9 +29,9 @@ class ElementFields:
 
     Attributes:
         strain, stress: (m, v) element means.
-        strain_size: (m,) size of the terms that the strain sums, which bounds its rounding.
+        strain_size: (m,) size of the terms whose sum is the strain, which bounds the rounding.
         force: (n, c) int B^T sigma.
-        force_size: (n,) size of the terms that the force sums.
+        force_size: (n,) size of the terms whose sum is the force.
         largest_force: largest nodal force of a single element.
         energy: int sigma : eps.
     """

@@ -108,7 +108,7 @@ class Findings:
 
 
 def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
-    """Compute |errors| / scale; for the scale 0, the result is 0 without an error, else inf."""
+    """Compute |errors| / scale; where the scale is 0, the result is 0 for an error of 0, else inf."""
     errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
     return np.asarray(np.divide(errors, scale, out=np.where(errors == 0.0, 0.0, np.inf), where=scale > 0))
 

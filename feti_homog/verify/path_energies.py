@@ -107,7 +107,7 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that the work is stored, lost in breaks, or becomes heat.
 
     Heat never falls, and `dissipated` changes only in breaks.  With friction the energy depends on the path, so that
-    the loss in breaks has no bounds.  Bonds break after the point of an event, but before that of an increment.
+    the loss in breaks has no bounds.  Bonds break after the point of an event, and before the point of an increment.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}

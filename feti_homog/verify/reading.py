@@ -56,7 +56,7 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN if a fibre has none.
+    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN where they are undefined.
 
     `strength` (f,) is the strength of bonds / the strength in the case.
     """

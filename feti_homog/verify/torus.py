@@ -1,6 +1,6 @@
 """Find torn nodes and sides at places on the torus of the periodic cell, and the bodies that meet there.
 
-The `shift` (2,) between images is the size of a periodic cell, and None if other conditions hold on its sides.
+The `shift` (2,) between images is the size of a periodic cell; None for other conditions on the sides.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class TornSides:
 
 @dataclass(frozen=True)
 class TornNodes:
-    """The b nodes on torn sides: their number in the mesh, place on the torus, subdomain and phase, (b,)."""
+    """The b nodes on torn sides: (b,) numbers in the mesh, places on the torus, subdomains and phases."""
 
     node: Int
     place: Int

@@ -179,7 +179,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
-        """Concatenate the nodes of lines, part after part.
+        """Concatenate the nodes of all parts, in the order of the parts.
 
         Raises:
             MeshError: all parts together have more than `limit` edges.

@@ -128,7 +128,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, as `ConvexSums.parting`."""
+        """Find the directions that best separate pairs, like `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -253,7 +253,7 @@ class Discs(ConvexCurves):
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Separate pairs along the vectors between centres, or along x for zero vectors, as `ConvexSums.parting`."""
+        """Separate pairs along the vectors between centres, or along x for zero vectors; see `ConvexSums.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]

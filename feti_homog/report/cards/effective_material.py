@@ -210,7 +210,7 @@ def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
 
 
 def number(value: float, width: int = 24) -> str:
-    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` is at least 12."""
+    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` must be at least 12."""
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)

@@ -1,4 +1,4 @@
-"""`feti-homog export`: the material card of a result folder, for another program or as a table.
+"""`feti-homog export`: write the material card of a result folder, for another program or as a table.
 
 Abaqus Keywords Guide, *ELASTIC and *EXPANSION: engineering constants are E1, E2, E3, nu12, nu13, nu23, G12, G13 and, on
 the next line, G23, where nu_ij is the strain along j under stress along i; TYPE=ANISOTROPIC takes the 21 entries

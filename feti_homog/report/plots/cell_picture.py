@@ -36,7 +36,7 @@ FLAT = 0.02  # standard deviation in each phase / largest stress, below which co
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the materials of the cell with the fibre numbers.
 
-    The figure also has the strength factors of the fibres if these factors differ.
+    The figure also has the strength factors of the fibres if the factors differ.
     """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])

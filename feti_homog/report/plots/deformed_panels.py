@@ -99,7 +99,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; two bars have titles."""
+        """Draw the colour bar of the shapes beside the axes; if there are two bars, both have titles."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")

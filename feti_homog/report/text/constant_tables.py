@@ -265,5 +265,5 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Return the constants that tables show; the first MOST for a load or secants in space."""
+    """Return the constants that tables show; for a load, or for secants in space, the first MOST."""
     return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else list(names[:MOST])

@@ -1,6 +1,6 @@
 """Write the summary of a result.json and tables for notebooks; register the reported analyses.
 
-Modules of pictures find an analysis by its name: `response_curves.CURVES`.
+Picture modules find an analysis by name, such as in `response_curves.CURVES`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -60,8 +60,8 @@ def reported(document: Document) -> ReportedAnalysis:
 def summary(document: Document) -> str:
     """Return the printed summary of a result.
 
-    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.  Lines have up
-    to 79 characters, tables up to 100, except for long names.
+    The summary has cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
+    Lines have up to 79 characters, tables up to 100, except for long names.
 
     Raises:
         KeyError: the document lacks a required key.

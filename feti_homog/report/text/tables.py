@@ -1,4 +1,4 @@
-"""Tables of a result as text for a terminal and as HTML, and the units of table columns."""
+"""Write the tables of a result as text for a terminal or as HTML, and find the units of table columns."""
 
 import re
 from collections.abc import Iterable, Sequence
