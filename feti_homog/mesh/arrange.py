@@ -20,7 +20,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
     `matched_arrangement`, and a table from `periodic_table.table_arrangement`.
 
     Raises:
-        MeshError: discs touch, the search for an arrangement fails, or the table is faulty.
+        MeshError: discs touch or are too many, the search for an arrangement fails, or the table is faulty.
     """
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)

@@ -138,7 +138,7 @@ def halved(pixels: Submesh) -> Submesh:
     low = pixels.points[corners[:, 0]]
     is_odd = (np.rint(low.sum(axis=1) / np.ptp(pixels.points[corners[0], 0])) % 2).astype(np.int64)
     sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
-    # The class of the lower left corner numbers a diagonal, behind the edges of all pixels.
+    # Diagonals follow the edges of all pixels, in the order of the classes of lower left corners.
     keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
     names = ("circles", "turns", "at_void", "debonded")
     diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}

@@ -12,7 +12,7 @@ from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
-# The arrays, except index arrays, with a row for each triangle, vertex, plane edge, class and torus edge.
+# The arrays, except index arrays, with one row per triangle, per vertex, per plane edge, per class, per torus edge.
 ROWS = (
     ("constituent",),
     ("points",),

@@ -87,7 +87,7 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
     `bottom` of the table, by default 0. Ellipses count as equal-area discs; voids are excluded.
 
     Raises:
-        CaseError: the table is faulty, or its size unknown; a centre is outside the window, or occurs twice.
+        CaseError: the table is faulty or lacks the size; fibres are fewer than two, outside, or at one place.
     """
     table = read_table(path)
     table = table.rows(np.flatnonzero(~table.is_void))

@@ -60,7 +60,7 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     A separate process decodes the file.
 
     Raises:
-        CaseError: the file is damaged or too large, or has not exactly one image.
+        CaseError: the file is damaged, too large, not a single image, or, unless `is_grey`, not of whole numbers.
     """
     image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), 128 * types.MOST_PIXELS)
     if not is_grey and image.dtype.kind == "f" and np.all((image == np.rint(image)) & (np.abs(image) < 1 << 31)):
@@ -92,9 +92,9 @@ def _decoded(path: Path, is_grey: bool) -> Array:
             from PIL import Image, UnidentifiedImageError  # comes with Matplotlib
 
             simplefilter("ignore")
-            Image.MAX_IMAGE_PIXELS = None  # the limit of this program holds
+            Image.MAX_IMAGE_PIXELS = None  # this program has its own limit
             try:
-                picture = Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP", "PPM"))  # others may start programs
+                picture = Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP", "PPM"))  # others may run programs
             except UnidentifiedImageError:
                 raise CaseError(f"{path.name}: is no image, or damaged") from None
             _check_size(path, picture.height, picture.width)
@@ -112,5 +112,5 @@ def _decoded(path: Path, is_grey: bool) -> Array:
             return pixels
     except FetiHomogError:
         raise
-    except Exception as error:  # Pillow raises many kinds
+    except Exception as error:  # Pillow raises many classes
         raise CaseError(f"{path.name}: cannot be read: {getattr(error, 'strerror', None) or error}") from None

@@ -247,10 +247,10 @@ def unpacked(content: bytes) -> Arrays:
 
 
 def refuse_others(directory: Path) -> None:
-    """Check that `directory`/checkpoint is missing, or contains only events.  Call on one rank.
+    """Check that the checkpoint folders in `directory` are missing, or contain only events. Call on one rank.
 
     Raises:
-        CaseError: the name belongs to a file, or the folder has files other than events.
+        CaseError: a file or a link has such a name, or a folder has files other than events.
         OSError: the folder cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):

@@ -63,7 +63,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
         curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
         number = np.r_[records[0], np.repeat(records[1:], 2)]
     size = np.abs(curve)
-    if path_curves.legs(document) > 1:  # compression after tension is no peak of the tension
+    if path_curves.legs(document) > 1:  # compression after tension does not count as its peak
         size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]

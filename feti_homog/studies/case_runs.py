@@ -237,7 +237,7 @@ class CaseRunner:
         return Outcome.COMPUTED, ""
 
     def _print(self, line: str) -> None:
-        standard_streams.Progress(self.comm, self.quiet).say(line)  # past the bar
+        standard_streams.Progress(self.comm, self.quiet).say(line)  # without damage to the progress bar
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:

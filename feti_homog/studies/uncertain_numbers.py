@@ -141,7 +141,7 @@ def _at(document: Any, path: toml_files.TomlPath) -> Any:
     result = document
     for name in path:
         result = result[0] if isinstance(result, list) and len(result) == 1 else result
-        if isinstance(result, list):  # numbers of sections with one name, from 1
+        if isinstance(result, list):  # sections of the same name are numbered from 1
             result = {str(number): each for number, each in enumerate(result, start=1)}
         result = result.get(name) if isinstance(result, dict) else None
     return result

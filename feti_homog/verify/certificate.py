@@ -21,7 +21,7 @@ from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
 from feti_homog.verify.reading import COATING, FIELDS, JSON, opened
 
-# Exceptions that numbers with an unexpected kind or shape cause.
+# Exceptions that numbers of an unexpected kind or shape raise.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError)
 
 

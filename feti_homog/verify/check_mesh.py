@@ -28,7 +28,7 @@ WITHOUT_BUBBLE = 1.7
 # Least ratio of an energy error to the sum of the element errors, which may cancel at arcs.
 LEAST_SHARE = 0.05
 MODE_LENGTH = 1e-3  # least length at which modes are evaluated / radius
-LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # names of loads of release rates
+LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # loads of release rates, by name
 # Middles of sides in barycentric coordinates: a quadrature rule, exact for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
@@ -175,7 +175,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
         if intact and not from_mesh:
             findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside arcs")
     if "path" in document and case["path"]["method"] != "events" and not from_mesh:
-        # Before the first increment exactly the nodes outside the arcs have bonds.
+        # Before the first increment, exactly the nodes outside the arcs have bonds.
         (inside, outside), first = _sides(cell, None), document["path"][0]
         count = first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)

@@ -179,7 +179,7 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     # u - E x at the nodes does not change.
     for c, R in zip(fibres.centre, fibres.radius, strict=True) if growth else ():
         gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
-        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
+        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least gap, -2 R, is to the fibre itself
         d = from_centre(x, c, files.size)
         r = np.hypot(*d.T)
         V += growth * d * (R / np.maximum(r, R) * np.clip(1 - (r - R) / half, 0.0, 1.0))[:, None]

@@ -31,7 +31,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
     Raises:
         CaseError: scikit-image is not installed.
-        MeshError: three phases touch each other, or gmsh cannot fill the outlines.
+        MeshError: three phases touch each other, elements are too many, or gmsh cannot fill the outlines.
     """
     try:
         from skimage import measure
@@ -70,7 +70,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         occ.synchronize()
         try:
             content = filled(gmsh, size, field)
-        except Exception as error:  # gmsh raises nothing more special
+        except Exception as error:  # gmsh raises no subclass
             advice = "expected larger regions of a phase: filter the image, or smooth = false"
             raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)

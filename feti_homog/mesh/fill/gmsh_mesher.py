@@ -40,7 +40,7 @@ def begin(
         policy: rules for the division into tiles.
 
     Raises:
-        MeshError: the fibres cannot be arranged, or the mesh would have too many elements.
+        MeshError: the fibres cannot be arranged or are too small, or the mesh would have too many elements.
     """
     sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = element_estimate.ElementEstimate.of(cell, listed)

@@ -18,7 +18,7 @@ MOST_PAIRS = 1000
 MOST_CANDIDATES = 10**7
 # Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
-# Triangle area / square of the longest edge, up to which the area is zero but for rounding.
+# Triangle area / square of the longest edge, up to which the area is zero except for rounding.
 FLAT_AREA = 1e-9
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
@@ -208,7 +208,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         faults += _listed(
             before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
         )
-    # An element between bare sides would be a neighbour of itself.
+    # An element between bare sides would be its own neighbour.
     bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
     lines = [f"no node between the corners of the {', '.join(bare)} side: expected one at least"]
     return [*faults, *(lines if bare else [])]
@@ -235,7 +235,7 @@ def islands(raw: RawMesh, torus: Torus) -> list[str]:
 
 
 def void_faults(raw: RawMesh, torus: Torus, has_voids: bool) -> list[str]:
-    """List unexpected holes, voids without an area, touching voids, and uncovered areas."""
+    """List unexpected holes, voids without an area, touching voids, voids at sides with tractions, uncovered areas."""
     mesh, pairs = torus.mesh, torus.low_copies(torus.at_void)
     empty = 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:

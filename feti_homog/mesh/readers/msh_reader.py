@@ -32,7 +32,7 @@ HOLE = "expected no elements in a void, which is a hole in the mesh (with voids 
 Selectors = Mapping[str, tuple[str | int, ...]]
 # Sine of the turn at a hull node, up to which the node lies on a straight side.
 STRAIGHT = 1e-5
-# Slope up to which sides count as upright; fraction of the hull that a cell with voids fills at least.
+# Slope up to which sides count as upright; least fraction of the hull that a cell with voids fills.
 UPRIGHT, FILLED = 1e-2, 0.4
 
 
@@ -218,7 +218,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
-    # Without a matrix, the user renames all groups, so that numbers are no further fault.
+    # Without a matrix, the user must rename all groups: numbers are then no further fault.
     faults = [
         f'{mesh.container} "{name}" is not a phase: {HOLE if name == phase_names.VOID else expected}'
         for name in names
@@ -231,7 +231,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     faults[-1] += f"; {known_names(mesh)}"
     # Propose the two largest groups for [cell.phases].
     shares: dict[str, float] = {}
-    with np.errstate(all="ignore"):  # coordinates are judged later
+    with np.errstate(all="ignore"):  # coordinates are checked later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for group, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
             if group and group[0] != phase_names.VOID:

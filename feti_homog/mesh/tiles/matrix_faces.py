@@ -56,7 +56,7 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     length = np.linalg.norm(vector, axis=1)
     normal = vector / length[:, None]
     clearance = np.full(len(ends), np.inf)
-    # Discs of about one radius at a time, so that searches omit small discs far from a line.
+    # Discs of similar radii at a time, so that searches omit small discs far from a line.
     classes = np.floor(np.log2(radii / radii.min())).astype(int)
     for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
         tree, reach = cKDTree(centres[members]), (1 + CLEAR) * radii[members].max()
@@ -213,8 +213,8 @@ def matrix_tiles(
     end, which = half.start[half.twin], np.tile(loop, 2)
     a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    # A face has one outer loop, and negative inner loops. The face beyond the sides has no outer loop. Loops around
-    # trees contain both halves of all lines, and have no area but for rounding.
+    # A face has one outer loop, and inner loops of negative area. The face beyond the sides has no outer loop. Loops
+    # around trees contain both halves of all lines, and have no area except for rounding.
     is_tree = np.bincount(loop, loop[half.twin] != loop) == 0
     around = np.bincount(face[:count], (np.bincount(which, cross) > 0) & ~is_tree, face.max() + 1)
     beyond = face[loop[half.twin[0]]]

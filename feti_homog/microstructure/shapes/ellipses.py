@@ -13,7 +13,7 @@ from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squared semi-axes, up to which an ellipse is a circle.
 SAME_AXES = 1e-12
-# The least ratio of shorter to longer semi-axis; thinner tips would need too small elements.
+# The least ratio of the shorter to the longer semi-axis; thinner tips would need too small elements.
 THINNEST = 0.05
 
 

@@ -26,7 +26,7 @@ from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
 OWN_COLOURS = "end, own colours"
-MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
+MAX_FRAMES, FRAME_TIME = 24, 250  # frames of the animation; milliseconds per frame
 PANEL_LIMIT = 30_000  # triangles in a panel
 WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # inches: all panels, an animated cell, the highest cell
 

@@ -183,7 +183,7 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     offset, length = _shortest(nodes[:, None] - starts[nearest] - 0.5 * step, period), np.linalg.norm(step, axis=2)
     fraction = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
     distance = np.linalg.norm(offset - (fraction - 0.5)[..., None] * step, axis=2)
-    # A vertex is the start of an edge, not an end.
+    # A vertex counts as the start of an edge, not as an end.
     best = np.arange(len(nodes)), (distance + SAME_PLACE * length * fraction).argmin(axis=1)
     at = before[nearest[best]] + (fraction * length)[best]
     order, unit = np.argsort(at, kind="stable"), plot_helpers.unit_label(file.attrs["length_unit"])

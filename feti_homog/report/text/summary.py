@@ -229,7 +229,7 @@ def phase_tables(document: Document) -> list[Table]:
     tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
     acting = [name for name, value in load.items() if value]
-    # stresses in proportion to the load
+    # Load factors need stresses in proportion to the load.
     has_factors = "path" not in document and not ("temperature" in acting and len(acting) > 1)
     stresses = [name for name in acting if has_factors and acting == [name] and name.startswith("S")]
     used = list[list[Any]]()
