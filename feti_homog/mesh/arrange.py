@@ -51,7 +51,7 @@ def random_arrangement(
     to `max_attempts` attempts (default: 10 for few fibres, 3 for many). Finally, `clear_shift` moves the arrangement.
 
     Raises:
-        MeshError: the search for an arrangement fails.
+        MeshError: the discs are too many or too dense, or the search for an arrangement fails.
     """
     from feti_homog.microstructure import random_fibres  # other cells do not need the module
 

@@ -176,7 +176,7 @@ class Torus:
 
     @cached_property
     def edge_lengths(self) -> Float:
-        """The length of each torus edge, measured along the chord for edges on ellipses."""
+        """The length (torus edges,) of each torus edge, along the chord for edges on ellipses."""
         ends = self.mesh.points[self.edges]
         lengths = np.empty(len(self.edge_keys))
         lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
@@ -241,7 +241,7 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 
 
 def components(n: int, one: Int, other: Int) -> Int:
-    """Label (n,) the connected components of the graph with n vertices and the edges (one, other)."""
+    """Return labels (n,) of the connected components of the graph with n vertices and the edges (one, other)."""
     graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 

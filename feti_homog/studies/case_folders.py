@@ -225,7 +225,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a failed or damaged case to WAITING, without error and events.  On one rank.  Raises like `set_aside`."""
+    """Reset a failed or damaged case to WAITING; remove error and events.  On one rank.  Raises like `set_aside`."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)

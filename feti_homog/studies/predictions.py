@@ -99,8 +99,8 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return the result numbers whose scatter matters, by name.
 
-    For a stiffness these are its constants, for a conductivity its entries, for a path its onset and peak, for other
-    analyses the numbers of their points.
+    These are the constants of a stiffness, the entries of a conductivity, the onset and peak of a path, and the numbers
+    at the points of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:

@@ -19,7 +19,7 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """The statistics of outputs over finished realisations, (points, ...).
+    """The statistics (points, ...) of outputs over finished realisations.
 
     `ci95` is half the width of the 95 % confidence interval of the mean, by Student's t.  `ci95` and `std` are NaN for
     fewer than two realisations.

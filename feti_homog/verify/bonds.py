@@ -173,7 +173,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    With shear compliances C_0 (intact) and C (damaged), and the slip C_0 t + g, the fraction bears t - g / (C - C_0).
+    With traction t, compliances C_0 (intact) and C (damaged), and slip C_0 t + g, the fraction bears t - g / (C - C_0).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))
@@ -190,7 +190,7 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """Return the number (phases, phases) of the section between two phases, -1 where bonds never part."""
+    """Return the section numbers (phases, phases) of pairs of phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

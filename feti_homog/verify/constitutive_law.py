@@ -115,10 +115,10 @@ def _given_stiffness(constants: Constants) -> Float:
 
 
 def _compliance(constants: Constants) -> Float:
-    """Compute the compliance (6, 6) in the material axes.
+    """Compute the compliance S (6, 6) in the material axes.
 
-    Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine it; plane stress needs
-    fewer constants, and the others have arbitrary stable values.
+    Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine S; plane stress needs fewer
+    constants, and the others have arbitrary stable values.
     """
     if "stiffness" in constants:
         return np.asarray(np.linalg.inv(_given_stiffness(constants)), float)
@@ -145,7 +145,7 @@ def _compliance(constants: Constants) -> Float:
 
 
 def turned(stiffness: Float, degrees: float) -> Float:
-    """Compute C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs for C' turned by `degrees` from x1 to x2."""
+    """Rotate a stiffness C' by `degrees` from x1 to x2: C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs."""
     voigt = VOIGT[len(stiffness)]
     turn = _turn(degrees, len(voigt))
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
@@ -155,7 +155,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """Compute the rotation matrix R (axes, axes) for a turn from x1 to x2."""
+    """Compute the rotation matrix R (axes, axes) from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

@@ -221,5 +221,5 @@ class DiscreteCell:
 
     @property
     def rounded_energy(self) -> float:
-        """Return a floor (energy per area) for energy scales: a cell without bonds may store only rounding."""
+        """Return a floor (energy per area) for energy scales: a cell without bonds stores only rounding errors."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -170,7 +170,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,).
 
-    The next half-line clockwise has the label among `label` (h,), a disc without half-lines among `alone` (n,).
+    `label` (h,) has the label of the next half-line clockwise, `alone` (n,) the label of a disc without half-lines.
     """
     order = np.lexsort((lines.angle, lines.node))
     node, line_angle = lines.node[order], lines.angle[order]

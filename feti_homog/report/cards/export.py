@@ -159,7 +159,7 @@ def _quoted(values: Iterable[float]) -> str:
 def csv_table(material: effective_material.EffectiveMaterial) -> str:
     """Write the material as a table in CSV format.
 
-    Rows: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
+    The rows are engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
     """
     rows, unit, C = list[tuple[str, float, str, str]](), material.stress_unit, material.stiffness
     for name, value in material.constants.items():
@@ -189,7 +189,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 
 
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
-    """Return the card for a result with a stiffness or a conductivity.  Raises like `SYMMETRIES` and `FORMATS`."""
+    """Return the card of a stiffness or conductivity. Raises like the functions in `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
         return effective_material.conductor_card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))

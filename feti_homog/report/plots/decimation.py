@@ -155,7 +155,7 @@ def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
     """Return the largest displacement factor s at which no drawn triangle turns over.
 
     For all s' up to s, det(I + s' grad u) = 1 + s' tr(grad u) + s'^2 det(grad u) >= LEAST_AREA in every drawn triangle.
-    The result is infinity without a limit.
+    The result is infinite if every factor is possible.
     """
     sides, moves = _sides(drawn.points, drawn), _sides(displacement, drawn)
     area = _determinant(sides)

@@ -294,5 +294,5 @@ def stress_unit(case: Document) -> str:
 
 
 def title_of(case: Document, phrase: str) -> str:
-    """Return a title of the case name, if any, and `phrase`."""
+    """Join the case name, if any, and `phrase` to a title."""
     return f"{plain(case.get('name', ''))}: {phrase}".lstrip(": ")

@@ -88,7 +88,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
 
 
 def _limit(axes: Axes, values: Array) -> None:
-    """End the ordinate where a few nodes at singular tips exceed all other values (n,)."""
+    """Limit the ordinate if a few nodes at singular tips exceed all other values (n,)."""
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
     low, high = 2.0 * low - high, 2.0 * high - low
     if high > low and (values.min() < low or values.max() > high):
@@ -98,7 +98,7 @@ def _limit(axes: Axes, values: Array) -> None:
 def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw.
 
-    A path has its peak, and the valley after the peak or a late state; another analysis has one state.
+    For a path, these are the peak, and the valley after it or a late state; for other analyses, one state.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
@@ -192,7 +192,7 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Chain edges (e, 2) to boundaries, as counterclockwise node lists.
+    """Chain edges (e, 2) into boundaries, as counterclockwise node lists.
 
     A closed boundary repeats its first node, whose normal is nearest to x1; an open one begins at an end.
     """

@@ -36,7 +36,7 @@ MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return tables of L^ef, also under minus the unit strains.  All entries have the decimals of the largest entry."""
+    """Return tables of L^ef, also under minus the unit strains.  All entries have as many decimals as the largest."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():

@@ -139,7 +139,7 @@ def components(point: Point) -> tuple[float, float]:
 
 
 def tip_table(document: Document, tips: Document) -> Table:
-    """Return the table with the largest-G tip for each load."""
+    """Return the table of the tip with the largest G for each load."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
     return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
