@@ -154,7 +154,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
     """Build a table from a list of fibres {column: value}; messages number the rows from 1.
 
     Raises:
-        CaseError: the list is faulty; a line for each fault.
+        CaseError: the list is faulty; one line per fault.
     """
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):

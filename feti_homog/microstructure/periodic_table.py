@@ -33,7 +33,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     Coordinates of fibres that are not discs are always rounded.
 
     Raises:
-        MeshError: rows lie outside, occur twice, overlap or touch; a line for each fault.
+        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch; one line per fault.
     """
     table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)

@@ -78,7 +78,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row whose number of cells is not `count`, or an empty string."""
+    """Return the fault of a row with an open quotation mark or without `count` cells, or an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"
@@ -165,7 +165,7 @@ def misspelt(word: str, missing: Sequence[str]) -> str:
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Convert a word to a number, with a decimal point or comma; None if it is not a number."""
+    """Convert a word to a number, with a decimal point or comma; None if the word is no finite number."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:
