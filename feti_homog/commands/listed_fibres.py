@@ -19,7 +19,7 @@ from feti_homog.typing import Float
 def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
-    The table has a row for each fibre and void, ordered by fibre number. Ellipses have the columns `a`, `b` and
+    The table has a row for each fibre and void, ordered by fibre number.  Ellipses have the columns `a`, `b` and
     `angle`, coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
 
     Raises:

@@ -30,7 +30,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw circles over an image as TABLE_circles.png; return this name. Raises CaseError if it names the image."""
+    """Draw circles over an image as TABLE_circles.png; return this name.  Raises CaseError if it names the image."""
     from feti_homog.report.plots import plot_helpers  # with Matplotlib
 
     picture = table.with_name(f"{table.stem}_circles.png")

@@ -79,7 +79,7 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder named in the arguments. Raises CaseError for a file, a missing folder, or a study."""
+    """Return the result folder named in the arguments.  Raises CaseError for a file, a missing folder, or a study."""
     directory: Path = arguments.directory
     if not os.path.isdir(directory):
         fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"

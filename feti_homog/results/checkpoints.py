@@ -4,8 +4,8 @@ An event holds load, bond states and scalars.  While there is room, the event al
 them, a resumed run computes the equilibrium of the event again.
 
 The file is `checkpoint/events` in the result folder, one record per event: a prefix, content length and CRC-32
-checksums of content and prefix, then the content. The first content is the run's signature, every other content an
-event packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes. A killed run may leave
+checksums of content and prefix, then the content.  The first content is the run's signature, every other content an
+event packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes.  A killed run may leave
 an incomplete last record, which does not count.
 """
 
@@ -247,7 +247,7 @@ def unpacked(content: bytes) -> Arrays:
 
 
 def refuse_others(directory: Path) -> None:
-    """Check that the checkpoint folders in `directory` are missing, or contain only events. Call on one rank.
+    """Check that the checkpoint folders in `directory` are missing, or contain only events.  Call on one rank.
 
     Raises:
         CaseError: a file or a link has such a name, or a folder has files other than events.

@@ -48,7 +48,7 @@ class FieldFile:
     `field_layout` lists tables, attributes and views of tables.
 
     Until `close` the file has the name `part`. A `with` block closes the file at its end. An error that all ranks raise
-    removes the file; any other exception leaves the file unfinished. Empty arrays have shapes (0, 2).
+    removes the file; any other exception leaves the file unfinished.  Empty arrays have shapes (0, 2).
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.

@@ -63,7 +63,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
         curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
         number = np.r_[records[0], np.repeat(records[1:], 2)]
     size = np.abs(curve)
-    if path_curves.legs(document) > 1:  # compression after tension does not count as its peak
+    if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
@@ -87,7 +87,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
-    """Describe the bond of a landmark by fibre and direction; empty if unknown. `title`: such as "first_break_"."""
+    """Describe the bond of a landmark by fibre and direction; empty if unknown.  `title`: such as "first_break_"."""
     if peak.get(f"{title}fibre") is None:
         return ""
     return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"

@@ -48,7 +48,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     """Read the points and settings of a table [sweep].
 
     A point is a value for every key that varies.  In a grid the last key in the file varies fastest; all sampled keys
-    together are the last axis. A faulty table gives no points; `faults` gets one line per fault.
+    together are the last axis.  A faulty table gives no points; `faults` gets one line per fault.
     """
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()

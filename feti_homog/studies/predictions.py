@@ -138,9 +138,9 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """Return the exact derivatives (m,) of the computed values with respect to an unknown, or None.
 
-    Elastic constants do not depend on strengths, nor, in a plane, on expansions. With a single interface the loads at
+    Elastic constants do not depend on strengths, nor, in a plane, on expansions.  With a single interface the loads at
     breaks are homogeneous: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not
-    soften. This holds if all loads grow in proportion up to the onset, without a previous temperature. The result is
+    soften.  This holds if all loads grow in proportion up to the onset, without a previous temperature.  The result is
     None if result.json does not determine the derivatives.
     """
     tables = path_curves.interface_sections(document)

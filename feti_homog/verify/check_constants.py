@@ -136,7 +136,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
         table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
         table["anisotropy"] = _distance(C, nearest)
     else:
-        # The mean over five rotations about x3 is exact: entries of the rotated tensor have at most four periods.
+        # The mean over five rotations about x3 is exact: rotated tensor entries have at most four periods per turn.
         mean = np.mean([turned((C + C.T) / 2, angle) for angle in np.arange(5) * 72.0], axis=0)
         sizes = np.sqrt(np.outer(mean.diagonal(), mean.diagonal()))
         M, angle = np.linalg.inv(mean / sizes) / sizes, np.pi * np.arange(DIRECTIONS) / DIRECTIONS

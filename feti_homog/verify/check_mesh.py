@@ -107,7 +107,7 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     """Compute normals (k, 2) and tributary lengths (k,) from the mesh, and whether they are exact (k,).
 
-    Round fibres have radial normals. The length of a node is half the length of its linear sides, or int N ds over its
+    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or int N ds over its
     quadratic sides; the normal is the mean of the normals of the sides, weighted by these lengths.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]

@@ -85,7 +85,7 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
     """Return the bonds (k,) that may exceed their strength at a point with breaks.
 
-    In a cascade, where a break overloads other bonds, any bond may. Where only contact has changed (strains and
+    In a cascade, where a break overloads other bonds, any bond may.  Where only contact has changed (strains and
     stresses agree to `tolerance`), only tips may: their energy release jumps with the contact.
     """
     if state.point == 0 or damaged_at(points[state.point]) == 0:

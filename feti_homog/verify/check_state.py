@@ -64,7 +64,7 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
 
     Forces on faces balance the traction; on the sides of the cell they balance Sigma n if prescribed, and prescribed
-    displacements are E x. The reaction of the fixed node, u* = 0, contains the rounding of all nodes.
+    displacements are E x.  The reaction of the fixed node, u* = 0, contains the rounding of all nodes.
     """
     nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
     # Periodic copies lie in one subdomain.  Glued nodes have one number: the places have even numbers, and the fibre

@@ -6,7 +6,7 @@ strains are differences of nearly equal displacements, rounding is 1e-15 of the 
 times the measured errors.
 
 Solver.  The Krylov method leaves relative jumps of `rtol`; laws of closed faces hold to the tolerance of the checks in
-a run, min(1000 rtol, 1e-4). As `rtol` is an entry of the result, 1e-4 bounds the tolerance that a result may claim.
+a run, min(1000 rtol, 1e-4).  As `rtol` is an entry of the result, 1e-4 bounds the tolerance that a result may claim.
 """
 
 import re

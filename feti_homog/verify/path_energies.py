@@ -182,7 +182,7 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
     """Check the work, and the loss in breaks by (P).
 
     The loss is the potential with the old bonds minus the potential with the new bonds, at the load of the break: after
-    the point of an event, or at the end of an increment. There, Voigt's mean stiffness at the new strain stores at
+    the point of an event, or at the end of an increment.  There, Voigt's mean stiffness at the new strain stores at
     least as much as the cell with the old bonds.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"

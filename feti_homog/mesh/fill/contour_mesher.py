@@ -70,7 +70,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         occ.synchronize()
         try:
             content = filled(gmsh, size, field)
-        except Exception as error:  # gmsh raises no subclass
+        except Exception as error:  # gmsh raises only Exception
             advice = "expected larger regions of a phase: filter the image, or smooth = false"
             raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)

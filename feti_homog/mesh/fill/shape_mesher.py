@@ -27,7 +27,7 @@ from feti_homog.typing import Float
 SAME_PLACE = 1e-6
 # Fewest and most grid cells along a side, for the grid of sizes that gmsh reads.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-# Edge length on a coating / thickness; cosine between normals of outline and side, above which the two face.
+# Edge length on a coating / thickness; cosine between outline and side normals, above which they face each other.
 COATING_EDGE, FACING = 2.0, 0.9
 # Number of sources that contribute to the size at a position.
 NEAREST = 12

@@ -168,7 +168,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
             try:
                 gmsh.merge(str(path))
                 refusals = []
-            except Exception:  # gmsh raises no subclass
+            except Exception:  # gmsh raises only Exception
                 refusals = ["Error: the file is damaged"]
             if faults := [line for line in gmsh.logger.get() if not line.startswith(passed)] + refusals:
                 raise MeshError(f"gmsh cannot read it: {faults[0].partition(': ')[2]}")

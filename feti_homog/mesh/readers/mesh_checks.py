@@ -12,7 +12,7 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Float, Int, Int32
 
-# Number of coincident pairs below which all pairs are listed: pairs grow with the square of the nodes.
+# Number of coincident pairs below which all are listed: the number grows with the square of the nodes.
 MOST_PAIRS = 1000
 # Limit for pairs of an edge and a nearby node, whose number may also grow with the square.
 MOST_CANDIDATES = 10**7

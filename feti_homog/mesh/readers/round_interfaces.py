@@ -204,7 +204,7 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, with offsets d from the mean, is |F^-1 (d - c)| = 1; None if no ellipse `_holds`.
+    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse or fails `_holds`.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()

@@ -12,7 +12,7 @@ stress along x; TB,ANEL takes the lower triangle of the stiffness (TBOPT = 0) by
 xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; shears have none.
 
 MOOSE: ComputeElasticityTensor takes C_ijkl: for `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
-for `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12]. ComputeEigenstrain takes the
+for `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
 components 11, 22, 33, 23, 13, 12 of a tensor, with half the engineering shears.
 """
 
@@ -189,7 +189,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 
 
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
-    """Return the card of a stiffness or conductivity. Raises like the functions in `SYMMETRIES` and `FORMATS`."""
+    """Return the card of a stiffness or conductivity.  Raises like the functions in `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
         return effective_material.conductor_card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))

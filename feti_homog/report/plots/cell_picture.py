@@ -68,7 +68,7 @@ def _cyclic_colours(count: int) -> Array:
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
-    A subdomain across materials counts once for each body.  Beyond `IN_LEGEND`, colours are pale, with numbers.
+    A subdomain across materials counts once for each body.  Beyond `IN_LEGEND` colours, they are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
@@ -100,7 +100,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the cell coloured by its mesh error density; return None without error estimates.
 
-    The density is fraction of the energy error / fraction of the area, the largest over all states.  Singular tips
+    The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips
     lie above the colour range: otherwise the rest of the cell would have one colour.
     """
     file, drawn = cell.file, cell.drawn
@@ -192,9 +192,9 @@ def deformed(
 ) -> Figure:
     """Draw the deformed cell in a state, coloured by a stress component.
 
-    The figure also shows the states of the interface. Displacements in the plane are magnified, over the undeformed
-    outline. A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
-    shear. For conduction, the figure shows isotherms and minus the flux.
+    The figure also shows the states of the interface.  Displacements in the plane are magnified, over the undeformed
+    outline.  A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
+    shear.  For conduction, the figure shows isotherms and minus the flux.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
     displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)

@@ -45,7 +45,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Choose one stress component and one colour range for all given states.
 
-        The case may name the component; by default all states determine the component, on a path its peak.
+        The case may name the component; by default all states determine the component, on a path the peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()

@@ -34,7 +34,7 @@ def plot(
 
     [output] of the case in result.json sets the stress component (default: from the unit strain) and the deformation
     scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by number
-    or label, only state_K.png is drawn. Call on one rank.
+    or label, only state_K.png is drawn.  Call on one rank.
 
     Raises:
         CaseError: the result has no such state or component.

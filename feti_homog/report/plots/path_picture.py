@@ -33,7 +33,7 @@ AREAS = {
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw stresses and interface states against the leading strain, with the landmarks.
 
-    A panel between both shows the change of temperature, if any. Selected points carry their numbers.
+    A panel between the two shows the change of temperature, if any.  Selected points carry their numbers.
     """
     points, case = document["path"], document["case"]
     component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
@@ -170,7 +170,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     """Draw the energies per area as a stack over the leading strain or the path position.
 
     The position is the number of earlier legs plus the load fraction on the leg. On a proportional path the load rises;
-    where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy. Returns
+    where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy.  Returns
     None for results without energies.
     """
     points = document.get("path") or [{}]

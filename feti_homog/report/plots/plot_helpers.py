@@ -165,7 +165,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     """Choose the colour range and the colour map of a stress.
 
     Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
-    zero if tension and pressure are similar. Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
+    zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
     default: meshes are fine at tips, where stresses are singular.
 
     Returns:
@@ -188,8 +188,8 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
     """Choose the colour range of a field.
 
-    At most 0.5 % of the area lies beyond either end, in each state of values (states, n). A field that is uniform to 1
-    % has one colour.
+    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
+    one colour.
 
     Returns:
         colour range, and the ends of the range beyond which values lie.
