@@ -206,7 +206,7 @@ class DiscreteCell:
 
     @cached_property
     def _scales_on_path(self) -> list[Scales]:
-        """Return the scales of all path points if friction keeps the rounding of earlier tractions; else none."""
+        """Return the scales of all path points if there is friction, which keeps earlier rounding; else []."""
         points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
         return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
 
