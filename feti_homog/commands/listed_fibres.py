@@ -20,10 +20,10 @@ def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
     The table has a row for each fibre and void, ordered by fibre number.  Ellipses have the columns `a`, `b` and
-    `angle`, coatings the column `coating`.  Numbers are exact, so that the table reproduces the cell.
+    `angle`, coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
 
     Raises:
-        CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is no disc or ellipse.
+        CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is neither disc nor ellipse.
     """
     fibres = read(source)
     if fibres.lacks_voids:
@@ -63,14 +63,14 @@ class ListedFibres:
 
     Attributes:
         size: (2,) width and height.
-        ellipses: N circles and ellipses, at the places in the table, or else with centres within the cell.
+        ellipses: N circles and ellipses; their centres are as in the table, or within the cell without a table.
         phases: N phase names; in cells that the program meshes, voids follow the fibres.
         coatings: (N,) thickness of the coatings, 0 without a coating.
         cores: (N,) radii of the voids within hollow fibres, else 0.
         origin: (2,) lower left corner.
         lacks_voids: whether the cell has voids that the list omits.
-        others: columns (N,) of fibres that are neither discs nor ellipses, else NaN; `ellipses` has discs of equal area
-            for these fibres.
+        others: table columns (N,) for fibres that are neither discs nor ellipses, NaN for discs and ellipses;
+            `ellipses` represents these other fibres by discs of equal area.
     """
 
     size: Float
@@ -104,7 +104,7 @@ def read(source: Path) -> ListedFibres:
 
 
 def _of_result(directory: Path) -> ListedFibres:
-    """Read the fibres of a result, from its case if the result lacks voids or outlines."""
+    """Read the fibres of a result, or of its case if the result lacks voids or outlines."""
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
     is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in fibres) and not cell.get("porosity")

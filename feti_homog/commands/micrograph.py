@@ -1,4 +1,4 @@
-"""Find the round fibres in a micrograph, as a table for [cell] geometry = "table" and a picture."""
+"""Find the round fibres in a micrograph: list them in a table for [cell] geometry = "table", and draw them."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
     """Return the round fibres in an image as circles (n, 3) and as a table.  On one rank.
 
     Raises:
-        CaseError: the image is faulty or without fibres.
+        CaseError: the image is faulty or has no fibres.
     """
     image = label_image.read_image(path, is_grey=True)[::-1].astype(float)  # the first row of an image is the upper one
     if not -1e100 < image.min() < image.max() < 1e100:
@@ -30,7 +30,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw circles over an image, in TABLE_circles.png; return its name.  Raises CaseError if both are one file."""
+    """Draw circles over an image as TABLE_circles.png; return this name.  Raises CaseError if it names the image."""
     from feti_homog.report.plots import plot_helpers  # with Matplotlib
 
     picture = table.with_name(f"{table.stem}_circles.png")

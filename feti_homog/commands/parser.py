@@ -49,7 +49,7 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A command-line parser that raises errors as CaseError, printed once with exit code 2."""
+    """A command-line parser whose errors are CaseError; the program prints the error and exits with code 2."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
@@ -132,7 +132,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
-    """Add the commands for many cases to a parser."""
+    """Add the commands for studies of many cases to a parser."""
     sweep = _command(commands, "studies.sweep", "run the cases of a file with [sweep]", SWEEP_HELP)
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
     sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, with a subfolder for each case")
@@ -170,7 +170,7 @@ def _command(
 
 
 def integer(word: str) -> int:
-    """Convert a word to an integer, without underscores.  Raises ValueError."""
+    """Convert a word of one to nine digits, with or without a sign, to an integer.  Raises ValueError."""
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)

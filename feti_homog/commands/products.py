@@ -1,4 +1,4 @@
-"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: products of a result."""
+"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: make the products of a result."""
 
 import argparse
 import os
@@ -41,7 +41,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the result states to files for VTK."""
+    """Write the states of a result to VTK files."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)
@@ -79,7 +79,7 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder in the arguments.  Raises CaseError for a file, no folder, or the folder of a study."""
+    """Return the result folder named in the arguments.  Raises CaseError for a file, a missing folder, or a study."""
     directory: Path = arguments.directory
     if not os.path.isdir(directory):
         fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"

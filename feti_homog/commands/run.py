@@ -1,4 +1,4 @@
-"""`feti-homog run`, `check`, `keys`, `options`: run and check a case file; the reference of its keys."""
+"""`feti-homog run`, `check`, `keys`, `options`: run or check a case file; print its keys and the solver options."""
 
 import argparse
 
@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Describe the run of a case, or the first case of a study.  Collective."""
+    """Describe the run of a case, or a study with the run of its first case.  Collective."""
     from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of the case file, or of the keys, sections and results that contain a word."""
+    """Print the reference of all keys, or of the keys, sections and results that contain the given words."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 

@@ -1,4 +1,4 @@
-"""`feti-homog sweep`, `collect`, `fit` and `uncertainty`: many cases, constants from them, result scatter."""
+"""`feti-homog sweep`, `collect`, `fit` and `uncertainty`: run many cases, fit constants, propagate scatter."""
 
 import argparse
 
@@ -27,7 +27,7 @@ def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the tables and the sweep picture."""
+    """Write the tables and the picture of a sweep."""
     from feti_homog.studies import collect as tables
 
     for line in mpi_errors.on_root_only(comm, tables.collect, arguments.directory, not arguments.no_pictures) or []:
@@ -41,7 +41,7 @@ def fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Compute the result scatter that uncertain numbers cause.  Collective."""
+    """Compute the scatter of results that uncertain numbers cause.  Collective."""
     from feti_homog.studies import uncertainty as scatter
 
     study = mpi_errors.on_root(comm, scatter.load, arguments.case)

@@ -1,4 +1,4 @@
-"""The coarse periodic mesh, its topology on the torus, submeshes and their refinement.
+"""Build the coarse periodic mesh, its topology on the torus, submeshes and their refinement.
 
 Imports `case`, `microstructure` and `schema`.  Main entries: `fill.gmsh_mesher.begin`, `readers.msh_reader.read`,
 `periodic_topology.Torus` and `refinement.refine`. Only gmsh sessions import the module gmsh.

@@ -20,7 +20,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
     `matched_arrangement`, and a table from `periodic_table.table_arrangement`.
 
     Raises:
-        MeshError: discs touch, the search for an arrangement fails, or the table is faulty.
+        MeshError: discs touch or are too many, the search for an arrangement fails, or the table is faulty.
     """
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)
@@ -51,7 +51,7 @@ def random_arrangement(
     to `max_attempts` attempts (default: 10 for few fibres, 3 for many). Finally, `clear_shift` moves the arrangement.
 
     Raises:
-        MeshError: the search for an arrangement fails.
+        MeshError: the discs are too many or too dense, or the search for an arrangement fails.
     """
     from feti_homog.microstructure import random_fibres  # other cells do not need the module
 

@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a rectangular cell on rank 0, with interface edges and void edges."""
+"""Represent the coarse periodic mesh of a rectangular cell on rank 0, with interface and void edges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace

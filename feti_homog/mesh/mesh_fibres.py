@@ -1,4 +1,4 @@
-"""The fibres in a mesh: numbers, centres, radii, semi-axes and coating thickness; unwrapped positions on the torus.
+"""Find fibres in a mesh: numbers, centres, radii, semi-axes, coating thickness, unwrapped positions on the torus.
 
 Directions on interfaces are angles about the centres.
 """

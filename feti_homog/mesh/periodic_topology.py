@@ -1,4 +1,4 @@
-"""The coarse cell as a torus: node classes, torus edges and constituents.
+"""Represent the coarse cell as a torus: node classes, torus edges and constituents.
 
 Two plane nodes that differ by a period form one class, and two boundary edges that differ by a period form one
 torus edge.  A constituent is a connected part of one phase on the torus, even if the cell boundary cuts it.
@@ -92,7 +92,7 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the ends (k, 2) of `chosen` torus edges, on sides of the left or lower copy."""
+        """Return the ends (k, 2) of `chosen` torus edges; on cell sides, of the left or lower copy."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 
@@ -165,7 +165,7 @@ class Torus:
         alone = np.bincount(self.triangle_torus_edges.ravel()) == 1
         ends = (edge_ends[some].ravel() for some in (between, alone))
         shared, free = (np.bincount(classes, minlength=len(self.class_keys)) for classes in ends)
-        # Each edge between constituents ends a sector, and so do both sides of a void, or outside, together.
+        # Each edge between constituents ends a sector; two edges at a void, or at the outside, together end one.
         sectors = shared + free // 2
         return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
 
@@ -176,7 +176,7 @@ class Torus:
 
     @cached_property
     def edge_lengths(self) -> Float:
-        """The length of each torus edge, measured along the chord for edges on ellipses."""
+        """The length (torus edges,) of each torus edge, along the chord for edges on ellipses."""
         ends = self.mesh.points[self.edges]
         lengths = np.empty(len(self.edge_keys))
         lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
@@ -205,7 +205,7 @@ class Torus:
     def nesting(self) -> Int:
         """The position (constituents,) of each constituent in the order from the outermost to the innermost.
 
-        The distance from the matrix, counted in constituents, comes first; then see `places_by_depth`.
+        The distance from the matrix, counted in constituents, comes first; `places_by_depth` decides ties.
         """
         one, other, _ = self.sides
         a, b = self.constituent[one], self.constituent[other]
@@ -241,7 +241,7 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 
 
 def components(n: int, one: Int, other: Int) -> Int:
-    """Label (n,) the connected components of the graph with n vertices and the edges (one, other)."""
+    """Return labels (n,) of the connected components of the graph with n vertices and the edges (one, other)."""
     graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 

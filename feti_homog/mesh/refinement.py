@@ -1,6 +1,6 @@
 """Refine a subdomain uniformly, without communication, and order the nodes for elimination.
 
-Each coarse triangle has a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse vertex,
+Each coarse triangle has a lattice with M = order * 2**refine intervals per side.  A fine node is a coarse vertex,
 the p-th lattice node of a coarse edge, or an inner node of a coarse triangle; arithmetic on coarse numbers
 identifies fine nodes on the torus and between subdomains.
 
@@ -23,7 +23,7 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 # Largest offset of a cut from the middle / number of triangles in the part.
 OFF_THE_MIDDLE = 0.1
-# Fewest intervals a side with which dissection also orders the many inner nodes of a coarse triangle.
+# Fewest intervals per side for which dissection also orders the inner nodes of a coarse triangle.
 MANY_INTERVALS = 8
 # The edges of `coarse_mesh.HALVES`; the diagonal is edge 4.
 SIDES = np.array([[[0, 1, 4], [4, 2, 3]], [[0, 4, 3], [1, 2, 4]]])
@@ -36,9 +36,9 @@ class ReferenceLattice:
     Lattices compare by identity, so that a lattice can be a cache key.
 
     Attributes:
-        intervals: M, the number of intervals a side.
+        intervals: M, the number of intervals per side.
         nodes: (q, 3) integer barycentric coordinates, summing to M: corners, then edges, then interior.
-        triangles: (4**refine, 3 or 6) lattice nodes; members 4k..4k+3 make up one triangle a level coarser.
+        triangles: (4**refine, 3 or 6) lattice nodes; rows 4k..4k+3 make up one triangle of the next coarser level.
     """
 
     intervals: int
@@ -128,7 +128,7 @@ class FineMesh:
 
 
 def halved(pixels: Submesh) -> Submesh:
-    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals between nodes of an even sum of row and column.
+    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals between nodes with an even sum of row and column.
 
     A submesh of triangles remains as it is.
     """
@@ -138,7 +138,7 @@ def halved(pixels: Submesh) -> Submesh:
     low = pixels.points[corners[:, 0]]
     is_odd = (np.rint(low.sum(axis=1) / np.ptp(pixels.points[corners[0], 0])) % 2).astype(np.int64)
     sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
-    # The class of the lower left corner numbers a diagonal, behind the edges of all pixels.
+    # Diagonals follow the edges of all pixels, in the order of the classes of lower left corners.
     keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
     names = ("circles", "turns", "at_void", "debonded")
     diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}

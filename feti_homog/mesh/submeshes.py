@@ -12,7 +12,7 @@ from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
-# The arrays, except index arrays, with a row for each triangle, vertex, plane edge, class and torus edge.
+# The arrays, except index arrays, with one row per triangle, per vertex, per plane edge, per class, per torus edge.
 ROWS = (
     ("constituent",),
     ("points",),
@@ -44,7 +44,7 @@ class Submesh:
         edge_class: (e,) torus edge of each plane edge.
         at_void: (torus edges,) whether a torus edge bounds a void, with only one triangle in the whole cell.
         debonded: (torus edges,) whether a torus edge is debonded from the start.
-        touching: (classes,) as `Torus.touching`.
+        touching: (classes,) as in `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
         pinned: local numbers of the classes that do not move: one class, against translations of the cell, Eq. (15),
@@ -95,7 +95,7 @@ class SubdomainTable:
     Attributes:
         body: (s,) constituent that contains each subdomain; 0 for subdomains across materials.
         rank: (s,) rank of each subdomain.
-        nesting: (constituents,) position in the order from the outermost to the innermost, as `Torus.nesting`.
+        nesting: (constituents,) position in the order from the outermost to the innermost, as in `Torus.nesting`.
         phase: (constituents,) number of the material phase.
         across: whether subdomains extend across materials.
     """
@@ -190,7 +190,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_classes(torus: Torus) -> Int:
-    """Return the keys of the pinned classes: one class, all on sides that move by E x, or none with tractions.
+    """Return the keys of the pinned classes: one class, all classes on sides that move by E x, or none with tractions.
 
     The one class of a periodic cell, Eq. (15), lies inside the matrix, nearest to a corner. On an interface, it would
     join both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts u*.
@@ -264,7 +264,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
-    """Join submeshes; identify classes and torus edges, but no plane vertices and plane edges."""
+    """Join submeshes; identify classes and torus edges, but neither plane vertices nor plane edges."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     _, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = np.concatenate([mesh.class_keys[mesh.pinned] for mesh in meshes])
@@ -287,6 +287,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Concatenate the index arrays `name`, each shifted by the number of `of` entries before."""
+    """Concatenate the index arrays `name`, each shifted by the number of `of` entries in earlier parts."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

@@ -1,4 +1,4 @@
-"""Fibres in a cross-section: outlines, tables, arrangements on the torus, and their statistics.
+"""Describe fibres in a cross-section: outlines, tables, arrangements on the torus, and statistics.
 
 Imports `microstructure.shapes`, `schema` and `system`.  Main entries: `arrangements.Arrangement`,
 `periodic_table.table_arrangement`, `random_fibres`.

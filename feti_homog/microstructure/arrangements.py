@@ -23,7 +23,7 @@ GMSH_DECIMALS = 12
 SMALLEST_RADIUS = 1e-6
 # The largest number of candidate gaps between tangents, and the least ratio of a candidate to the widest gap.
 MOST_GAPS, NARROWEST = 4, 0.7
-# Limit for pairs of near fibres: about three per fibre, unless many lie on top of each other and fill the memory.
+# Limit for pairs of near fibres: usually about three per fibre, but fibres on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
 # Periods from a cell to the neighbouring cells.
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
@@ -86,7 +86,7 @@ class Arrangement:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating."""
+        """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating if any."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
         return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
 

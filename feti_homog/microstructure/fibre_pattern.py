@@ -1,4 +1,4 @@
-"""Patterns of round fibres in a rectangle: a periodic cell, or a window of a micrograph."""
+"""Represent patterns of round fibres in a rectangle: a periodic cell, or a window of a micrograph."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,7 +55,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        For a window the value is unbiased: on average, discs lose as much area outside as other discs have inside.
+        For a window the value is unbiased: on average, discs have as much area outside as others have inside.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
@@ -81,13 +81,13 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Read the fibre pattern of a window, at least two fibres, from a table.
+    """Read the fibre pattern of a window, with at least two fibres, from a table.
 
     `size` is the width and height of the window, by default the size in the table. The lower left corner is `left` and
     `bottom` of the table, by default 0. Ellipses count as equal-area discs; voids are excluded.
 
     Raises:
-        CaseError: the table is faulty, or its size unknown; a centre is outside the window, or occurs twice.
+        CaseError: the table is faulty or lacks the size; fibres are fewer than two, outside, or at one place.
     """
     table = read_table(path)
     table = table.rows(np.flatnonzero(~table.is_void))

@@ -111,7 +111,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     cell size, and "left" and "bottom" give the lower left corner.
 
     Raises:
-        CaseError: the table is faulty; a line for each fault, with its line in the file.
+        CaseError: the table is faulty; one line per fault, with the line number in the file.
     """
     name, faults = path.name, _Faults(path.name)
     sizes: dict[str, float] = {}
@@ -154,7 +154,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
     """Build a table from a list of fibres {column: value}; messages number the rows from 1.
 
     Raises:
-        CaseError: the list is faulty; a line for each fault.
+        CaseError: the list is faulty; one line per fault.
     """
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):

@@ -1,4 +1,4 @@
-"""Find round fibres in grey values: Hough's transform of edges, and circles by least squares."""
+"""Find round fibres in grey values by Hough's transform of edges, and fit circles by least squares."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
@@ -16,8 +16,8 @@ RIM = directions(np.linspace(0.0, 2 * np.pi, 65))
 def round_fibres(image: Float) -> Float:
     """Find the circles (k, 3), centres and radii in pixels, around round fibres in an image of several grey values.
 
-    Edges are ridges in the slope of the filtered grey values, above its root mean square. Fibres are bright or dark,
-    whichever puts more edges on circles. The first row of the image (rows, columns) is the lowest.
+    Edges are ridges in the slope of the filtered grey values, above the root mean square slope. Fibres are bright or
+    dark, whichever puts more edges on circles. The first row of the image (rows, columns) is the lowest.
     """
     slope = np.stack(np.gradient(gaussian_filter(image, 1.5)))
     steepness = np.hypot(*slope)
@@ -81,7 +81,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return by how many deviations (k,) the edges on visible rims exceed the fraction expected `by_chance`."""
+    """Return (f - `by_chance`) sqrt(length) (k,), with the fraction f of edges on visible rims; 0 for hidden rims."""
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)

@@ -13,9 +13,9 @@ from feti_homog.schema import types, wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Array, Int32
 
-# Modes of Pillow with several numbers a pixel: how many are colours.
+# Modes of Pillow with several numbers per pixel, and how many of these are colours.
 COLOURS = {"LA": 1, "RGB": 3, "RGBA": 3}
-# Modes of Pillow with one whole number a pixel: bits, palettes, 8, 16 and 32 bits.
+# Modes of Pillow with one whole number per pixel: bits, palettes, 8, 16 and 32 bits.
 WHOLE_NUMBERS = {"1", "P", "L", "I", "I;16", "I;16B", "I;16L", "I;16N"}
 
 
@@ -23,10 +23,10 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     """Read an image, and replace its labels by phases.
 
     Returns the phase numbers (rows, columns), the lowest row first, and the phase names, the matrix first, others in
-    order, voids last. `is_mirrored` puts the mirror images beside and above the image.
+    alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, in a line each.
+        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, one per line.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)
@@ -60,7 +60,7 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     A separate process decodes the file.
 
     Raises:
-        CaseError: the file is damaged or too large, or has not exactly one image.
+        CaseError: the file is damaged, too large, not a single image, or, unless `is_grey`, not of whole numbers.
     """
     image = input_files.in_own_process(path, partial(_decoded, is_grey=is_grey), 128 * types.MOST_PIXELS)
     if not is_grey and image.dtype.kind == "f" and np.all((image == np.rint(image)) & (np.abs(image) < 1 << 31)):
@@ -92,9 +92,9 @@ def _decoded(path: Path, is_grey: bool) -> Array:
             from PIL import Image, UnidentifiedImageError  # comes with Matplotlib
 
             simplefilter("ignore")
-            Image.MAX_IMAGE_PIXELS = None  # the limit of this program holds
+            Image.MAX_IMAGE_PIXELS = None  # this program has its own limit
             try:
-                picture = Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP", "PPM"))  # others may start programs
+                picture = Image.open(stream, formats=("PNG", "TIFF", "JPEG", "BMP", "PPM"))  # others may run programs
             except UnidentifiedImageError:
                 raise CaseError(f"{path.name}: is no image, or damaged") from None
             _check_size(path, picture.height, picture.width)
@@ -112,5 +112,5 @@ def _decoded(path: Path, is_grey: bool) -> Array:
             return pixels
     except FetiHomogError:
         raise
-    except Exception as error:  # Pillow raises many kinds
+    except Exception as error:  # Pillow raises many classes
         raise CaseError(f"{path.name}: cannot be read: {getattr(error, 'strerror', None) or error}") from None

@@ -33,7 +33,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     Coordinates of fibres that are not discs are always rounded.
 
     Raises:
-        MeshError: rows lie outside, occur twice, overlap or touch; a line for each fault.
+        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch; one line per fault.
     """
     table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
@@ -73,8 +73,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
     """Shrink the fibres of a table that overlap slightly.
 
-    Fibres that touch or overlap by up to SAME_FIBRE of a radius shrink until they separate.  Returns the table, and a
-    remark with the rows of the smaller fibres.
+    Fibres that touch, or overlap by up to SAME_FIBRE times the smaller radius, shrink until they separate. Returns the
+    table, and a remark with the rows of the shrunk fibres.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
@@ -114,7 +114,7 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """Check the fibres of a table and place them on the torus.
 
-    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,).  Raises as
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises like
     `table_arrangement`.
     """
     assert table.width is not None and table.height is not None
@@ -125,7 +125,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
     radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), list[str]()
-    # Discs reach into a periodic cell; in a cut window the centres are within.
+    # Discs must reach into a periodic cell; in a cut window the centres must lie inside.
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())

@@ -20,7 +20,7 @@ MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
 CLOSE = 0.002
 # Relative enlargement of the radii, so that the descent ends in finite time.
 RADIUS_EXCESS = 1e-3
-# Steps of the descent after which an arrangement counts as jammed; others take less than 200.
+# Steps of the descent after which an arrangement counts as jammed; others take fewer than 200.
 MAX_STEPS = 2000
 ATTEMPTS = 3
 # Area fraction of discs grown by half the gap above which there are no random patterns.
@@ -34,7 +34,7 @@ class NearestNeighbours:
     Attributes:
         distances: (N, k), in ascending order; infinite if a window has too few fibres.
         directions: (N, k) degrees from x1 towards x2, in [0, 360).
-        weights: (N, k), weights of the distances in their distribution; a column has the sum 1.  In a periodic cell
+        weights: (N, k), weights of the distances in their distribution; each column sums to 1.  In a periodic cell
             weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
             that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]
             compensates that fewer long distances count.  A column is zero if none of its distances counts.

@@ -78,7 +78,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row whose number of cells is not `count`, or an empty string."""
+    """Return the fault of a row with an open quotation mark or without `count` cells, or an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"
@@ -99,7 +99,7 @@ def _half(value: float) -> float:
     return value / 2
 
 
-# Other names of a column (former entries take precedence), the column, and the conversion of values. Major and Minor,
+# Other names of a column (earlier entries take precedence), the column, and the conversion of values. Major and Minor,
 # ImageJ's axes, make an area superfluous; MATLAB's Centroid_1 is x, centroid-0 of scikit-image is the row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
     (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1", "col", "column"), "x", float),
@@ -140,7 +140,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
     """Recognize `known` columns in a line of names, in upper or lower case; return unknown words as well."""
     bare = list(map(_bare, words))
     if MATLABS_AXIS in bare:
-        # MATLAB's orientation is an angle; other programs' are in radians, or from another axis.
+        # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
     # Where y points down, angles are still measured as the picture is seen.
     values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
@@ -165,7 +165,7 @@ def misspelt(word: str, missing: Sequence[str]) -> str:
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Convert a word to a number, with a decimal point or comma; None if it is not a number."""
+    """Convert a word to a number, with a decimal point or comma; None if the word is no finite number."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

@@ -1,4 +1,4 @@
-"""report.html: one page of a result with its tables, pictures, cards and case, readable without a network."""
+"""Write report.html: one page with all tables, pictures, cards and the case of a result, readable offline."""
 
 import base64
 from contextlib import suppress
@@ -46,7 +46,7 @@ def write(directory: Path) -> Path:
     Call on one rank.
 
     Raises:
-        CaseError: the folder has no result, or one of its files is missing or damaged.
+        CaseError: the folder has no result, is the folder of a sweep, or has a missing or damaged file.
         FetiHomogError: the report cannot be written.
     """
     if not directory.is_dir():

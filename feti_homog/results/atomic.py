@@ -53,7 +53,7 @@ def commit(part: Path, path: Path) -> None:
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write bytes at position `start` of a file, and drop the former file end.
+    """Write bytes at position `start` of a file, and drop all former bytes from there on.
 
     If the content `lasts`, the function waits until the bytes are on the disk. A killed writer leaves unfinished bytes
     at the file end, which a reader must recognize.
@@ -80,7 +80,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files of killed writers: of any machine if this process writes `alone`."""
+    """Remove unfinished files of ended writers, or of all writers if this process writes `alone`."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):

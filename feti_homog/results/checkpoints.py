@@ -4,9 +4,9 @@ An event holds load, bond states and scalars.  While there is room, the event al
 them, a resumed run computes the equilibrium of the event again.
 
 The file is `checkpoint/events` in the result folder, one record per event: a prefix, content length and CRC-32
-checksums of content and prefix, then the content.  The first content is the run's signature, every other an event
-packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes.  A killed run may leave a last
-record shorter than its length, which does not count.
+checksums of content and prefix, then the content.  The first content is the run's signature, every other content an
+event packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes.  A killed run may leave
+an incomplete last record, which does not count.
 """
 
 import contextlib
@@ -34,9 +34,9 @@ FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # DROPPED 
 FORMAT = 12  # raise when the content of an event changes
 HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
 PREFIX = struct.Struct("<QII")
-# Bytes of events, after which further events have no multipliers.
+# Total size of the events in bytes, beyond which further events have no multipliers.
 WHOLE_BYTES = 64 * 2**20
-# Arrays that the equilibrium of an event computes again.
+# Arrays that a run computes again with the equilibrium of an event.
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
 Arrays = dict[str, NDArray[Any]]
@@ -45,7 +45,7 @@ Arrays = dict[str, NDArray[Any]]
 def room_of(case: Case) -> int | None:
     """Return the size limit in bytes for events with multipliers.
 
-    The limit is None, for no limit, if all fields are kept, and with friction, where one load has many equilibria.
+    The limit is None, for no limit, if all fields are kept, or with friction, where one load has many equilibria.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
@@ -54,7 +54,7 @@ class EventsInMemory:
     """A store of distributed events in memory, for runs without files; every method is collective.
 
     Attributes:
-        room: bytes of events, after which further events have no multipliers; None without a limit.
+        room: total size in bytes, beyond which further events have no multipliers; None without a limit.
     """
 
     def __init__(self, comm: Intracomm, room: int | None = WHOLE_BYTES) -> None:
@@ -247,10 +247,10 @@ def unpacked(content: bytes) -> Arrays:
 
 
 def refuse_others(directory: Path) -> None:
-    """Check that `directory`/checkpoint is missing, or contains only events.  Call on one rank.
+    """Check that the checkpoint folders in `directory` are missing, or contain only events.  Call on one rank.
 
     Raises:
-        CaseError: the name belongs to a file, or the folder has files other than events.
+        CaseError: a file or a link has such a name, or a folder has files other than events.
         OSError: the folder cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):

@@ -47,8 +47,8 @@ class FieldFile:
 
     `field_layout` lists tables, attributes and views of tables.
 
-    Until `close` the file has the name `part`.  A context manager closes the file at the end of its block.  An error
-    that all ranks raise removes the file; any other exception leaves it unfinished.  Empty arrays have shapes (0, 2).
+    Until `close` the file has the name `part`. A `with` block closes the file at its end. An error that all ranks raise
+    removes the file; any other exception leaves the file unfinished.  Empty arrays have shapes (0, 2).
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
@@ -94,7 +94,7 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: field_layout.StatePart) -> None:
-        """Add state `number` (0, 1, ...) and flush the file; cell means are equal on all ranks."""
+        """Add state `number` (0, 1, ...) and flush the file; cell means must be equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))

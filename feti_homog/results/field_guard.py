@@ -28,7 +28,7 @@ MAY_BE_NAN = ("centre", "radius", "stress_33", "mesh_error")
 def require_own(path: Path, state: int | None = None) -> None:
     """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
 
-    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or in `state`.
+    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or one `state`.
     A child process reads the file, because HDF5 may crash on it.  Raises CaseError; FetiHomogError if unreadable.
     """
     if not path.is_file():
@@ -39,7 +39,7 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 
 def require_tables(path: Path, state: int | None) -> None:
-    """Check a file in this process, as `require_own`."""
+    """Check a file like `require_own`, but in this process."""
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:
@@ -97,7 +97,7 @@ def _require_layout(path: Path, file: Any, state: int | None) -> None:
 
 
 def _blocks(table: Any) -> Iterator[Any]:
-    """Yield rows of a table (n, ...), not too many at a time for the memory."""
+    """Yield the rows of a table (n, ...) in blocks that fit in memory."""
     for start in range(0, len(table), 1 << 16):
         yield table[start : start + (1 << 16)]
 
@@ -113,7 +113,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 
 
 def _require_mesh(path: Path, file: Any) -> None:
-    """Require a case with the phases, elements with an area, fibres in the mesh, and interface nodes at its nodes."""
+    """Require a case with all phases, elements with an area, fibres in the mesh, and interface nodes at mesh nodes."""
     try:
         cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

@@ -154,7 +154,7 @@ def tables(part: Any) -> dict[str, records.Description]:
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the fields of a part that become attributes, because they have no rows: values by name."""
+    """Return the values, by name, of the fields of a part that become attributes, because they have no rows."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 

@@ -1,8 +1,8 @@
 """Find the path landmarks, and choose the points to store and to show.
 
 Landmarks are first softening, first break, peak, valley after the peak, and end.  The peak is the largest stress before
-a fall, in the component with the largest strain.  Points are entries of `path` in result.json.  At the end of a path,
-fields are kept for both ends, for points around drops, and for evenly spaced points between them.
+a fall, in the component with the largest strain. Points are entries of `path` in result.json. When a path ends, fields
+are kept at both ends, at points around drops, and at evenly spaced points in between.
 """
 
 from collections.abc import Collection, Sequence
@@ -27,7 +27,7 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Successive turning points differ by more than `threshold`; an end of the curve counts if it also does.
+    Successive turning points differ by more than `threshold`; an end of the curve counts if it differs as much.
     """
     entries, low, high, rises, falls = list[int](), 0, 0, True, True
     for number, value in enumerate(values):
@@ -63,7 +63,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
         curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
         number = np.r_[records[0], np.repeat(records[1:], 2)]
     size = np.abs(curve)
-    if path_curves.legs(document) > 1:  # compression after tension is no peak of the tension
+    if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
@@ -87,20 +87,20 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
-    """Describe the bond at a landmark, such as "first_break_", by fibre and direction; empty if unknown."""
+    """Describe the bond of a landmark by fibre and direction; empty if unknown.  `title`: such as "first_break_"."""
     if peak.get(f"{title}fibre") is None:
         return ""
     return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"
 
 
 def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
-    """Return the stress component of the peak at each path point."""
+    """Return the stress at each path point, in the component of the peak."""
     component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
     return [float(point["stress"][component]) for point in document["path"]]
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the stress fall after the peak, to the valley or the end of its leg, divided by the largest stress."""
+    """Return the larger relative fall of the stress after the peak: to the valley, or to the end of the leg."""
     leg = path_curves.legs_of(document)
     last = stresses_of(document, peak)[np.flatnonzero(leg == leg[peak["event"]])[-1]]
     remaining = (last, peak.get("stress_left", peak["stress"]))
@@ -117,7 +117,7 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
     """Describe the load at which a phase passes its strength before the peak, between the kept points `numbers`.
 
-    Utilisations are linear in between, and from the unloaded cell to the first point.
+    Utilisations are interpolated linearly between these points, and from the unloaded cell to the first point.
     """
     lines, component = list[str](), voigt.voigt_names(len(document["path"][0]["stress"]))[0].index(peak["strain_name"])
     means = [np.array([point[name] for point in document["path"]])[numbers, component] for name in ("stress", "strain")]
@@ -135,7 +135,7 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
 
 
 def marks(document: path_curves.Document) -> dict[int, str]:
-    """Return the titles of all landmarks, by rising point number."""
+    """Return the titles of all landmarks by point number, in ascending order."""
     peak = peak_of(document)
     largest = name_of(document, peak)
     places = {
@@ -155,7 +155,7 @@ Drop = tuple[float, int, int]
 
 
 def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
-    """Return the rising numbers of the points whose fields are stored.
+    """Return the numbers of the points whose fields are stored, in ascending order.
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
@@ -219,7 +219,7 @@ def _norm(values: Float, shear: float) -> Float:
 
 
 def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Choose at most `rows` path points, or of the points `among` (rising).
+    """Choose at most `rows` points of the path, or of the points `among` (in ascending order).
 
     The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
     further points at evenly spaced numbers of broken bonds.

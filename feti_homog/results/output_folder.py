@@ -1,7 +1,7 @@
 """Lock and check the result folder, and write its events.log.
 
 One run at a time writes to the folder, and replaces no foreign file.  A run recognizes result files by content, not by
-a marker in the folder: a user may add a foreign file of such a name later.
+a marker in the folder: a user may later add a foreign file with such a name.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that a run can use `directory`: writable or still to be made, and not in use.
+    """Check that a run can use `directory`: it is writable or can be created, and no other run uses it.
 
     The check creates no file or folder.
 
@@ -70,7 +70,7 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder has the name of a result file, or the reverse, or a foreign file has such a name.
+        CaseError: a folder or a broken link has the name of a result file, or a foreign file has such a name.
     """
     if not directory.is_dir():
         return
@@ -145,7 +145,7 @@ def refuse_begun(directory: Path) -> None:
     """Refuse the folder of a begun run that has no result.json yet.  Call on one rank.
 
     Raises:
-        CaseError: the run goes on, or ended early; of a path the message has the points and the load.
+        CaseError: the run still works, or ended early; for a path, the message gives the number of points and the load.
     """
     is_begun = any(os.path.lexists(directory / name) for name in (LOCK, "checkpoint"))
     if not is_begun or os.path.lexists(directory / result_json.NAME):
@@ -204,7 +204,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove the result files whose names are not in `written`, and events without a log.  Call on one rank."""
+    """Remove the result files whose names are not in `written`, and events if no log is written.  Call on one rank."""
     if LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -216,7 +216,7 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 
 
 def write_product(path: Path, text: str) -> Path:
-    """Write the output of a command, a card or a fibre table, to a file; return its path.
+    """Write the output of a command (a card or a fibre table) to a file; return its path.
 
     If `path` is a link, the function replaces the file at its target.
 

@@ -64,13 +64,13 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg with bonds in `counts`; all points without such a leg."""
+    """Return the points up to the end of the first leg on which a number in `counts` is not 0; else all points."""
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield, from the second leg on: number, component whose strain changes most, point of this component's peak."""
+    """Yield, from the second leg on: number, component with the largest strain change, point of its largest stress."""
     leg, changed = legs_of(document), changed_components(document)
     strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
     for number in range(2, legs(document) + 1):
@@ -88,7 +88,7 @@ def legs_of(document: Document) -> Float:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of (n, c) with entries above a fraction of the largest entry."""
+    """Return the columns of (n, c) with entries above `share` times the largest entry."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
@@ -141,7 +141,7 @@ def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
 def scales_with_toughness(document: Document) -> bool:
     """Return whether strains and stresses of a path are proportional to the root of the toughness.
 
-    Bonds break by energy, on springs that the toughness does not change.
+    This holds if bonds break by energy, on springs that do not depend on the toughness.
     """
     laws = [bond_laws.LAWS.get(section.get("criterion", bond_laws.DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
@@ -151,7 +151,7 @@ def scales_with_toughness(document: Document) -> bool:
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
 
-    Where bonds break at a load t, all further bonds break that cannot carry t without them.  The cell then follows the
+    Where bonds break at a load t, all bonds that cannot carry t without them also break.  The cell then follows the
     next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
     and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """

@@ -30,7 +30,7 @@ SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, o
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Write `directory`/result.json, and the folder if needed; return the file path.
+    """Write `directory`/result.json, create the folder if needed, and return the file path.
 
     NumPy arrays and scalars become lists and numbers, tuples lists, paths strings. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.
@@ -59,7 +59,7 @@ def read(directory: Path) -> dict[str, Any]:
     """Return the document of `directory`/result.json.
 
     Raises:
-        CaseError: the file is missing, not JSON, no table or changed, or its layout has another version.
+        CaseError: the file is missing, is not a JSON table or has changed, or its layout has another version.
     """
     path = Path(directory) / NAME
     try:
@@ -142,7 +142,7 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV, with an apostrophe before strings that a spreadsheet would compute."""
+    """Return rows as CSV, with an apostrophe before strings that a spreadsheet would evaluate."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -231,7 +231,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize with indents; an array of numbers, and each row of a matrix, has one line."""
+    """Serialize with indents; an array of numbers, or a row of a matrix, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

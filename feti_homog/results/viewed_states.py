@@ -67,12 +67,12 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Read a cell state from an open result.h5, as `read_state`."""
+    """Read a cell state from an open result.h5, as `read_state` does."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
     points, triangles, strain = file["mesh/points"][()], file["mesh/triangles"][()], group.attrs["strain"]
-    # The macroscopic strain has the displacement H x, in the plane and along the fibres.
+    # The macroscopic strain causes the displacement H x, in the plane and along the fibres.
     along = strain[[4, 3]] if more else np.zeros(2)
     gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
     nodes["fluctuation"] = nodes["displacement"] - (points - points.min(axis=0)) @ gradient.T

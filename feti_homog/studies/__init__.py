@@ -1,4 +1,4 @@
-"""Many cases from one file: sweeps, fits of constants to measured values, and the scatter by uncertain inputs.
+"""Run many cases from one file: sweeps, fits of constants to measured values, scatter from uncertain inputs.
 
 Imports `analysis`, `case`, `materials`, `microstructure`, `report`, `results`, `schema` and `system`.
 Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,

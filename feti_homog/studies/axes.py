@@ -48,7 +48,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     """Read the points and settings of a table [sweep].
 
     A point is a value for every key that varies.  In a grid the last key in the file varies fastest; all sampled keys
-    together are the last axis.  A faulty table gives no points; a line for each fault is appended to `faults`.
+    together are the last axis.  A faulty table gives no points; `faults` gets one line per fault.
     """
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
@@ -114,7 +114,7 @@ def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, or an empty string; sampled ranges need no step and no count."""
+    """Return the fault of an axis, or an empty string; sampled ranges need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"

@@ -1,4 +1,4 @@
-"""The sweep folder: its case list, a folder for each case, and their progress.
+"""Manage the sweep folder: the case list, a folder for each case, and the progress of the cases.
 
 DIR/sweep.json, cases.csv     the cases; `feti-homog collect` adds the results to cases.csv
 DIR/case-0001/case.toml       the case with its defaults, as `feti-homog run` reads it
@@ -60,7 +60,7 @@ BEGUN = (Status.RUNNING, Status.INTERRUPTED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason for it, and the content of result.json or of an unfinished path."""
+    """The progress of a case, the reason, and the content of result.json or of an unfinished path."""
 
     status: Status
     reason: str = ""
@@ -225,7 +225,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a failed or damaged case to WAITING, without error and events.  On one rank.  Raises like `set_aside`."""
+    """Reset a failed or damaged case to WAITING; remove error and events.  On one rank.  Raises like `set_aside`."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)

@@ -91,7 +91,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     Other jobs may run other cases of the sweep at the same time.
 
     Raises:
-        CaseError: as `run_all`, or the number is out of range, or another process runs the case.
+        CaseError: as for `run_all`, or the number is out of range, or another process runs the case.
         ConvergenceError: the case failed, now or before.
         FetiHomogError: the result could not be written.
     """
@@ -237,7 +237,7 @@ class CaseRunner:
         return Outcome.COMPUTED, ""
 
     def _print(self, line: str) -> None:
-        standard_streams.Progress(self.comm, self.quiet).say(line)  # past the bar
+        standard_streams.Progress(self.comm, self.quiet).say(line)  # without damage to the progress bar
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:

@@ -31,7 +31,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """Write the tables and the picture of a sweep to its folder; return the lines to print.  On one rank.
 
     Raises:
-        CaseError: as `read`.
+        CaseError: as for `read`.
         FetiHomogError: a file cannot be written.
     """
     index, states = _index_and_states(directory)

@@ -19,7 +19,7 @@ from feti_homog.typing import Array, Float
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
 LEAST_CHANCE = 1e-3  # probability of equally large residuals, below which the model is refused
-# The data do not determine directions below this relative singular value; smaller entries of a direction are rounding.
+# Directions with a smaller relative singular value are undetermined; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-5, 60  # the relative step that ends the search is far below 1 % differences and std
 Model = Callable[[Float], Float]
@@ -34,7 +34,7 @@ class ParameterEstimates:
         computed, residuals: (m,) f(x) and (f(x) - y) / s.
         jacobian: (m, n) derivatives of the residuals.
         at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
-        singular_values: (n,) of the Jacobian by relative unknowns, x / estimate.
+        singular_values: (n,) of the Jacobian with respect to relative unknowns, x / estimate.
         directions: (n, n) right singular vectors of the same Jacobian, in rows.
         evaluations: number of evaluations of f.
         converged: whether the search reached a minimum.
@@ -62,7 +62,7 @@ class ParameterEstimates:
 
     @property
     def influence(self) -> Float:
-        """The change of each estimate per standard deviation of each datum, (n, m)."""
+        """The changes (n, m) of the estimates per standard deviation of the data."""
         size, V = _sizes(self.x), self.directions[: self.rank]
         pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
@@ -93,7 +93,7 @@ class ParameterEstimates:
 
     @property
     def shares(self) -> Float:
-        """The fraction of the variance of each estimate that each datum contributes, (n, m)."""
+        """The fractions (n, m) of the variances of the estimates that the data contribute."""
         squares = self.influence**2
         total = squares.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))

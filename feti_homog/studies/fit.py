@@ -53,7 +53,7 @@ class Fit(Study):
     data: Sequence[Datum]
 
     def at(self, x: Sequence[float]) -> Sweep:
-        """Return the cases of all tests at the unknowns x (n,).  Raises CaseError as `cases`."""
+        """Return the cases of all tests at the unknowns x (n,).  Raises CaseError like `cases`."""
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:

@@ -1,4 +1,4 @@
-"""Read a fit file: a case with unknown constants, and measured values; and report all faults."""
+"""Read a fit file, a case with unknown constants and measured values, and report all faults."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ def load(path: Path) -> Fit:
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Fit:
-    """Build a fit from a document whose files are relative to `folder`.  Raises CaseError as `load`."""
+    """Build a fit from a document whose files are relative to `folder`.  Raises CaseError like `load`."""
     document = {"name": "fit", **toml_files.to_document(values)}
     reader = FitReader(folder)
     unknowns = reader.unknowns(document.pop(sections.UNKNOWN, None))

@@ -1,4 +1,4 @@
-"""Outputs of a case: the numbers of result.json that fill cases.csv, and the meaning of all columns."""
+"""Extract the outputs of a case, the numbers of result.json that fill cases.csv; describe all columns."""
 
 import re
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Draw moduli.png, moduli of a sweep over the fibre fraction, and fit.png, residuals and fit curves."""
+"""Draw moduli.png (moduli of a sweep over the fibre fraction) and fit.png (residuals and fit curves)."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -147,7 +147,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     """Draw the residuals and fit curves.
 
     The first panel has a row for each single value, with its residual in standard deviations; the second has measured
-    points and the computed curves of the `results` of the tests, without results the computed values at the points.
+    points and the computed curves of the tests' `results` or, without results, the computed values at the points.
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]

@@ -1,4 +1,4 @@
-"""Measured values of a fit, the computed values in a result.json, and their exact derivatives."""
+"""Relate the measured values of a fit to computed values in result.json, and to exact derivatives."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -99,8 +99,8 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return the result numbers whose scatter matters, by name.
 
-    For a stiffness these are its constants, for a conductivity its entries, for a path its onset and peak, for other
-    analyses the numbers of their points.
+    These are the constants of a stiffness, the entries of a conductivity, the onset and peak of a path, and the numbers
+    at the points of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
@@ -125,7 +125,7 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """Return the computed values (m,) that correspond to the data.  Raises CaseError if the result lacks one."""
+    """Return the computed values (m,) that correspond to the data.  Raises CaseError if a value is missing."""
     values = _values(document)
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:
@@ -138,10 +138,10 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
     """Return the exact derivatives (m,) of the computed values with respect to an unknown, or None.
 
-    Elastic constants do not depend on strengths, nor on expansions in a plane.  With a single interface the loads at
-    breaks are homogeneous: of degree 1 in its only strength, of degree 1/2 in the toughness of springs that do not
-    soften.  This holds if all loads grow in proportion up to the onset, without a temperature that precedes them.
-    The result is None if result.json does not determine the derivatives.
+    Elastic constants do not depend on strengths, nor, in a plane, on expansions.  With a single interface the loads at
+    breaks are homogeneous: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not
+    soften.  This holds if all loads grow in proportion up to the onset, without a previous temperature.  The result is
+    None if result.json does not determine the derivatives.
     """
     tables = path_curves.interface_sections(document)
     name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name

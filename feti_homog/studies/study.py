@@ -95,7 +95,7 @@ class Study(ABC):
         """Return the printed tables of a finished study."""
 
     def digest(self) -> str:
-        """Return the digest of the study: studies of equal cases and inputs have equal digests."""
+        """Return the digest of the study: studies with equal cases and inputs have equal digests."""
         cases = [entry.identity for entry in self.first_cases().entries]
         return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 

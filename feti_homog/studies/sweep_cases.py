@@ -1,4 +1,4 @@
-"""Expand a sweep file to numbered cases, and check every case."""
+"""Expand a sweep file into numbered cases, and check every case."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -69,10 +69,10 @@ def load(path: str | Path) -> Sweep:
 
 
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
-    """Expand a document with a table "sweep" to its cases.
+    """Expand a document with a table "sweep" into its cases.
 
     The cases run through all points before the next realisation, so that more realisations add cases at the end.
-    File names in the document are relative to `folder`.  Raises CaseError as `load`.
+    File names in the document are relative to `folder`.  Raises CaseError like `load`.
     """
     document = toml_files.to_document(values)
     if sections.SWEEP not in document:

@@ -1,4 +1,4 @@
-"""The table of a sweep: inputs, outputs and results of all cases, with statistics over realisations."""
+"""Tabulate a sweep: inputs, outputs and results of all cases, with statistics over realisations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """The statistics of outputs over finished realisations, (points, ...).
+    """The statistics (points, ...) of outputs over finished realisations.
 
     `ci95` is half the width of the 95 % confidence interval of the mean, by Student's t.  `ci95` and `std` are NaN for
     fewer than two realisations.
@@ -115,7 +115,7 @@ class SweepTable:
         for key in varied:
             if (value := self.input_of(point, key)) is None:
                 continue
-            # Without its section, but with a material's phase and an interface's number.
+            # A key loses its section, but keeps a material's phase and an interface's number.
             section, _, rest = key.partition(".")
             name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
             name = name.replace(".", " ").replace("_", " ")
@@ -145,7 +145,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points that differ by one key only; `x` are the rising values of the key."""
+    """A series of sweep points that differ by one key only; `x` has the ascending values of the key."""
 
     label: str
     points: list[int]

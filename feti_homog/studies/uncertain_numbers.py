@@ -83,7 +83,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     if faults:
         return Uncertainty({})
     result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
-    # The rounding error of an eigenvalue is at most the matrix order times the norm, which the order bounds.
+    # The rounding error of an eigenvalue is at most n eps times the norm, which is at most the order n.
     if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
         place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
         faults.append(f"{place}: these correlations are impossible; expected a positive semidefinite matrix")
@@ -125,14 +125,14 @@ def _means(
     elif not deviation > 0:
         faults.append(f"[{wording.dotted_key(path[:-1])}] {path[-1]} = {wording.toml_value(value)}: {EXPECTED}")
     else:
-        # A pair of entries of a symmetric stiffness is one number, Cij as for its derivatives.
+        # Two symmetric entries of a stiffness are one number, with the name Cij, as in derivatives.
         entry = ((*path[:-2], "C" + "".join(sorted(path[-2:]))) if is_entry else path, deviation)
         given += [] if is_entry and entry in given else [entry]
     return value["mean"]
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a path; None for other values, and for a path into one of several sections."""
+    """Return the number at a path; None for other values, or if the path fits several sections."""
     result = _at(document, toml_files.in_lists(path))
     return float(result) if types.is_number(result) else None
 
@@ -141,7 +141,7 @@ def _at(document: Any, path: toml_files.TomlPath) -> Any:
     result = document
     for name in path:
         result = result[0] if isinstance(result, list) and len(result) == 1 else result
-        if isinstance(result, list):  # numbers of sections with one name, from 1
+        if isinstance(result, list):  # sections of the same name are numbered from 1
             result = {str(number): each for number, each in enumerate(result, start=1)}
         result = result.get(name) if isinstance(result, dict) else None
     return result

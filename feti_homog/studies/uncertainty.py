@@ -135,7 +135,7 @@ def load(path: Path) -> ScatterStudy:
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
-    """Build a study of scatter from a document whose files are relative to `folder`.  Raises CaseError as `load`."""
+    """Build a study of scatter from a document whose files are relative to `folder`.  Raises CaseError like `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
     table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
     if isinstance(table, dict):

@@ -1,4 +1,4 @@
-"""The certificate of a result: all laws that the result must obey, checked from its files alone.
+"""Certify a result: check all laws that the result must obey, from its files alone.
 
 Imports `case` and `system`.  The package has its own reader, elements and torus, so that a defect of the solver cannot
 hide itself; it uses neither MPI nor PETSc.  Main entry: `certificate.verify`, which `feti-homog verify DIR` prints.

@@ -1,4 +1,4 @@
-"""Bond laws by independent formulas, and the law at every interface node.
+"""Evaluate bond laws by independent formulas, and select the law at interface nodes.
 
 A law is a class, here or in `softening`, with the name that `case/bond_laws.py` lists.  Tractions (k, c) have a normal
 and a tangential component, and an axial one in generalized plane strain.
@@ -15,7 +15,7 @@ from feti_homog.case import bond_laws
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.reading import ResultFiles, State
 
-# Keys of a section with one number, and the key whose number is the default, if any.
+# Keys of a section that have one number; each maps to the key that provides its default, if any.
 NUMBERS = {
     "normal_stiffness": "", "tangential_stiffness": "", "axial_stiffness": "tangential_stiffness",
     "normal_strength": "", "tangential_strength": "", "axial_strength": "tangential_strength",
@@ -37,23 +37,23 @@ class BondLaw(ABC):
 
     @property
     def grows_by_release(self) -> bool:
-        """Return whether bonds at tips break by energy release, which is not in the files."""
+        """Return whether bonds at tips break by energy release, which the fields do not determine."""
         return bool(self.section.get("growth") == "released")
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """Compute the utilisation (k,) of the strength by tractions (k, c); 0 in compression, 1 at a break."""
+        """Compute utilisations (k,) of the strength under tractions (k, c): 1 at a break, 0 under pure compression."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Describe a break under the traction (1, c), with the keys that envelope points have."""
+        """Describe a break under the traction (1, c), with the keys of envelope points."""
 
     def jumps(self, traction: Float) -> Float:
         """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
-        """Compute the modes psi (k,): 0 opens, pi/2 shears, tan^2 psi = G_II / G_I if `has_toughness`."""
+        """Compute the modes psi (k,): 0 in opening, pi/2 in shear; tan^2 psi = G_II / G_I if `has_toughness`."""
         pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
@@ -62,7 +62,7 @@ class BondLaw(ABC):
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) for damage that rises from `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area (k,) absorbed as damage rises from `before` to `after` (k,), in modes psi (k,)."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -84,7 +84,7 @@ class BondLaw(ABC):
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c); default inf."""
+        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c); inf without a key."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -150,7 +150,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
     """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,) has all nodes.  With several sections or scattered strengths, the numbers of the law are (p,).
+    `damage` (k,) is given at all nodes.  With several sections or scattered strengths, the law has numbers (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -173,7 +173,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    With shear compliances C_0 (intact) and C (damaged), and the slip C_0 t + g, the fraction bears t - g / (C - C_0).
+    With traction t, compliances C_0 (intact) and C (damaged), and slip C_0 t + g, the fraction bears t - g / (C - C_0).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))
@@ -190,7 +190,7 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """Return the number (phases, phases) of the section between two phases, -1 where bonds never part."""
+    """Return the section numbers (phases, phases) of pairs of phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

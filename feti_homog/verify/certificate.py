@@ -1,4 +1,4 @@
-"""The certificate, as text and as JSON: all laws, checked on the files of a result folder in a separate process."""
+"""Check all laws on the files of a result folder, in a separate process; write the certificate as text or JSON."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
 from feti_homog.verify.reading import COATING, FIELDS, JSON, opened
 
-# Exceptions that numbers with an unexpected kind or shape cause.
+# Exceptions that numbers of an unexpected kind or shape raise.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError)
 
 
@@ -61,7 +61,7 @@ class Certificate:
 
 def verify(directory: Path) -> Certificate:
     """Check a result folder against all laws; raise a one-line CaseError if a file is unreadable."""
-    # Damaged numbers may ask for any memory and time: the limits are five times the need of results of 3 to 5 MB.
+    # Damaged numbers may demand any memory and time: the limits are five times the needs of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
     seconds = input_files.LEAST_SECONDS + size / input_files.BYTES_A_SECOND
     return input_files.in_own_process(directory, _verified, (1 << 30) + 32 * size, seconds)

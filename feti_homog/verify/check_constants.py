@@ -1,4 +1,4 @@
-"""Laws of result.json alone: status, reciprocity, bounds, compliance, expansion, engineering constants."""
+"""Check status, reciprocity, bounds, compliance, expansion and engineering constants in result.json."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ RTOL = 1e-8  # default tolerance of the dual problems
 DIRECTIONS = 720  # number of directions across the fibres in half a turn
 SECTIONS = "moduli", "constants", "transversely_isotropic", "transverse_moduli"
 NOISE = 1e-3  # bound of noise: absolute for Poisson's ratios, else relative to the largest constant of the kind
-# Constants with these beginnings of names have a scale of at least 1.
+# Beginnings of the names of constants that have a scale of at least 1.
 RATIOS = ("eta", "anisotropy", "deviation")
 
 
@@ -36,7 +36,7 @@ def check_status(findings: Findings, cell: DiscreteCell) -> None:
 def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that stiffnesses are symmetric and thermal stresses obey Levin's formula.
 
-    Debonded cells with contact are skipped: contact without tension breaks the reciprocity.
+    Debonded cells with contact are skipped: unilateral contact breaks reciprocity.
     """
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
@@ -75,7 +75,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
                 pair = 1 / (cell.fractions @ (1 / (phases[:, None] + added))) - added
                 findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
     if cell.files.is_spatial:
-        # With contact, the columns are secants under different loads, and have no meaningful inverse.
+        # With contact, the columns are secants under different loads, so that the matrix has no meaningful inverse.
         is_linear = "effective_stiffness_compression" not in document
         findings.require("compliance", is_linear is ("compliance" in document), "compliance")
         if "compliance" in document:
@@ -120,7 +120,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
     Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """
-    # Scaled to a unit diagonal, so that stiff directions do not round off the others.
+    # Scaled to a unit diagonal, so that rounding in stiff directions does not spoil the others.
     n, voigt, sizes = len(C), VOIGT[len(C)], np.sqrt(np.outer(C.diagonal(), C.diagonal()))
     S = np.linalg.inv(C / sizes) / sizes
     pairs, shears = [(0, 1), (1, 0)], {"G12": 2}
@@ -136,7 +136,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
         table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
         table["anisotropy"] = _distance(C, nearest)
     else:
-        # The mean over five turns about x3 is exact: entries of the turned tensor have at most four waves in a turn.
+        # The mean over five rotations about x3 is exact: rotated tensor entries have at most four periods per turn.
         mean = np.mean([turned((C + C.T) / 2, angle) for angle in np.arange(5) * 72.0], axis=0)
         sizes = np.sqrt(np.outer(mean.diagonal(), mean.diagonal()))
         M, angle = np.linalg.inv(mean / sizes) / sizes, np.pi * np.arange(DIRECTIONS) / DIRECTIONS

@@ -1,7 +1,7 @@
-"""Laws of loads: states and result.json have the loads of the case, and the same numbers.
+"""Check that states and result.json have the loads of the case, and that their numbers agree.
 
-A case prescribes the strain or the stress of all n components; in generalized plane strain the temperature is the last
-strain component.
+A case prescribes the strain or the stress of each of n components; in generalized plane strain the temperature is the
+last strain component.
 """
 
 import json
@@ -24,14 +24,14 @@ NAMES = {
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
 TEMPERATURE, COUNTS = "temperature", {status.name.lower(): status for status in Status}
-OF_ARCS = "debonded_length", "debonded_share", "debonded_shares"  # entries of an angle, equal in all unit loads
+OF_ARCS = "debonded_length", "debonded_share", "debonded_shares"  # entries of an angle, equal under all unit loads
 UNIT_LOADS = {3: [0, 1, 2], 6: [0, 1, 5, 2, 6, 4, 3]}  # components in the order of the states; 6 is the temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # large fields of a state
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A load: `values` (n,) of its components, which are stresses where `by_stress` (n,)."""
+    """A load: `values` (n,) of its components, stresses where `by_stress` (n,) is true, else strains."""
 
     values: Float
     by_stress: Bool
@@ -40,7 +40,7 @@ class Prescribed:
 def targets(case: Document) -> list[Prescribed]:
     """Return the loads of a case, with all components.
 
-    A component that a load does not name keeps its value and kind; at first its stress is 0.
+    A component that a load omits keeps its previous value and kind; initially stresses and temperature are 0.
     """
     v = 6 if case["analysis"]["plane"] == "generalized" else 3
     n = v + (v > 3)
@@ -63,7 +63,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
     """Yield the prescribed load at every point of a path.
 
     A leg is straight, from the end of the previous leg, or from 0, to its waypoint.  A component that changes between
-    strain and stress starts at its value in the last point.
+    strain and stress starts at its value at the previous point.
     """
     ends, leg, ended = targets(case), 0, False
     by_events = case["path"]["method"] == "events"
@@ -78,12 +78,12 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
                 start = np.where(before.by_stress == end.by_stress, start, np.where(end.by_stress, *pairs))
         share = along - leg
         yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
-        # A leg of events ends with a point at its waypoint without breaks.
+        # With events, a leg ends at its waypoint with a point without breaks.
         ended, last = abs(share - 1) <= ROUNDING and not (by_events and damaged_at(point)), point
 
 
 def damaged_at(point: Document) -> int:
-    """Return the number of bonds that break or soften at a point, or in the increment before."""
+    """Return the number of bonds that break or soften at a point, or in the increment that ends there."""
     return int(point["broke"]) + int(point.get("softened") or 0)
 
 
@@ -92,7 +92,7 @@ class StateNumbers(State):
     """A state with cohesive tractions but without the large `FIELDS`, which are in memory for one state at a time.
 
     Attributes:
-        stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 with all springs, and only in springs.
+        stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.
         released: (k,) whether a bond is at a tip that breaks by energy release.
         used: (k,) utilisation at bonded nodes, NaN where `released`, else 0.
         heat: conjugate of the temperature, -<alpha : sigma>.
@@ -136,10 +136,10 @@ Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
     """Check the loads of points and states against the case; return states with their rows.
 
-    A path keeps `[output] states` states, at points that result.json lists, the first and the last among them.
+    A path keeps `[output] states` states; result.json lists their points, which include the first and the last.
     """
     document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
-    # The scale of stresses is that of the bonded cell: computed strains are not a scale for prescribed stresses.
+    # The bonded cell gives the scale of stresses: computed strains are no scale for prescribed stresses.
     given, v = (np.where(load.by_stress, 0.0, load.values) for load, _ in rows), len(cell.reuss)
     stresses = [cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum())) for strains in given]
     largest = float(np.abs([*stresses, *(state.mean_stress for state in states)]).max(initial=0.0))

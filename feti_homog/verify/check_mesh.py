@@ -1,4 +1,4 @@
-"""Laws of the mesh, its interface nodes, the initially debonded arcs, and the estimated mesh error.
+"""Check the mesh, interface nodes, initially debonded arcs, tips of arcs, and the estimated mesh error.
 
 The mesh error is compared with an estimate by stresses averaged at nodes (Zienkiewicz and Zhu 1987).
 """
@@ -17,26 +17,26 @@ from feti_homog.verify.findings import ROUNDING, Findings, Section
 from feti_homog.verify.reading import COATING, State, Status
 from feti_homog.verify.torus import from_centre
 
-# Largest distance in degrees between the tip of an arc and its mesh node; nodes this near are on neither side.
+# Largest distance in degrees between the tip of an arc and its mesh node; closer nodes are on neither side.
 AT_TIP = 0.06
 # Largest errors of lengths and normals if straight sides replace unknown curves, which turn by at most half a turn.
 LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
-# Errors by fits to several elements over errors by averages: 1.5 to 1.9 for quadratic elements without a bubble, else
-# 0.76 to 1.6, in hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to twice; up to a quarter more
-# for elements as large as a fibre.
+# Ratio of errors by fits to several elements to errors by nodal averages: measured 1.5 to 1.9 for quadratic elements
+# without a bubble, otherwise 0.76 to 1.6, in hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to
+# twice; up to a quarter more for elements as large as a fibre.
 WITHOUT_BUBBLE = 1.7
-# Least error of an energy over the sum of the element errors, which arcs may cancel.
+# Least ratio of an energy error to the sum of the element errors, which may cancel at arcs.
 LEAST_SHARE = 0.05
 MODE_LENGTH = 1e-3  # least length at which modes are evaluated / radius
-LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # names of loads of release rates
+LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # loads of release rates, by name
 # Middles of sides in barycentric coordinates: a quadrature rule, exact for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that elements fill the cell, and that torn sides meet in pairs or at voids.
+    """Check that elements fill the cell, and that torn sides lie in pairs or at voids.
 
-    Areas are positive, and sizes, counts and area fractions in result.json agree with the mesh.
+    Also check that areas are positive, and that sizes, counts and fractions in result.json agree with the mesh.
     """
     elements, sides, section, phases = cell.elements, cell.sides, cell.files.document["cell"], cell.files.phases
     mesh, (width, height), porosity = cell.files.mesh, cell.files.size, section.get("porosity", 0.0)
@@ -107,8 +107,8 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     """Compute normals (k, 2) and tributary lengths (k,) from the mesh, and whether they are exact (k,).
 
-    Round fibres have radial normals.  The length of a node sums half of its linear sides, or int N ds of its quadratic
-    sides; the normal is the mean of the normals of the sides, weighted by these lengths.
+    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or int N ds over its
+    quadratic sides; the normal is the mean of the normals of the sides, weighted by these lengths.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
@@ -143,7 +143,7 @@ def _tangents(points: Float, frame: Float, places: Float) -> Float:
     """Compute dx / dt (s, q, 2), t in [0, 1], along sides, at `places` 2 t - 1 (q,) in [-1, 1].
 
     The nodes of the sides are `points` (s, n, 2), ends first.  A side is an elliptic arc, the image of a unit arc under
-    its `frame` (s, 2, 2); with a frame of NaN it is the circular arc through its three nodes, or straight.
+    its `frame` (s, 2, 2); without a frame (NaN) it is the circular arc through its three nodes, or straight.
     """
     on_ellipse = np.isfinite(frame[:, 0, 0])
     frame = np.where(on_ellipse[:, None, None], frame, np.eye(2))
@@ -165,7 +165,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
     off = [abs(point["angle"] - angle) for point, angle in zip(points, angles, strict=False)]
     findings.record("arcs", off, "the angle of a point")
     for state in states:
-        # The law of the tables reports a wrong number of a point.
+        # The law "tables" reports a wrong point number.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
         bonded = state.status == Status.BONDED
@@ -175,7 +175,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
         if intact and not from_mesh:
             findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside arcs")
     if "path" in document and case["path"]["method"] != "events" and not from_mesh:
-        # Before the first increment exactly the nodes outside the arcs have bonds.
+        # Before the first increment, exactly the nodes outside the arcs have bonds.
         (inside, outside), first = _sides(cell, None), document["path"][0]
         count = first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
@@ -197,7 +197,7 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check G = G_I + G_II and their mode psi, and the places and lengths of tips by the mesh."""
+    """Check G = G_I + G_II and the mode psi, and compare the places and lengths of tips with the mesh."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     table = {name: np.array(tips[name]) for name in ("G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load")}
     G, first, second, psi, length, angle, number, load = table.values()
@@ -217,7 +217,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check element errors by a second estimate under unit loads, and the energy error by the sum of element errors."""
+    """Compare element errors with a second estimate under unit loads, and the energy error with their sum."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

@@ -1,4 +1,4 @@
-"""Laws of paths and envelopes: breaks and their loads, tips, and the first break in every direction.
+"""Check paths and envelopes: breaks and their loads, tips, and the first break in every direction.
 
 Not all points of result.json have a state with fields; laws of counts hold at all points.
 """
@@ -17,10 +17,10 @@ from feti_homog.verify.reading import Status
 
 
 def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of breaks, that bonds never heal, and the fracture energy of a path.
+    """Check the numbers of breaks and the fracture energy of a path, and that bonds never heal.
 
-    A break adds G_c times the broken length, with the mode of the state before; if the files lack this state, the
-    energy must be within the range over all modes.
+    A break adds G_c times the broken length, at the mode in the state before the break; if the files lack this state,
+    the energy must lie in its range over all modes.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     for number, (point, after) in enumerate(pairwise(points), start=1):
@@ -74,7 +74,7 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
         if not by_events:
             continue
         largest, broke = used.max(initial=1.0), damaged_at(points[state.point])
-        # This point has the number of breaks, the next point their nodes: so many bonds are loaded as the worst bond.
+        # This point has the number of breaks, the next point their nodes: as many bonds are loaded like the worst bond.
         worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[::-1][:broke]
         findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
         if after is not None and after.point == state.point + 1:
@@ -85,8 +85,8 @@ def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> No
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
     """Return the bonds (k,) that may exceed their strength at a point with breaks.
 
-    In a cascade, where a break overloads other bonds, all bonds may.  Where only contact has changed (strains and
-    stresses agree to `tolerance`), tips may: their energy release jumps with the contact.
+    In a cascade, where a break overloads other bonds, any bond may.  Where only contact has changed (strains and
+    stresses agree to `tolerance`), only tips may: their energy release jumps with the contact.
     """
     if state.point == 0 or damaged_at(points[state.point]) == 0:
         return np.zeros(len(state.released), bool)
@@ -152,7 +152,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         at, angle, unit = f"envelope[{number}]", 360.0 * number / len(points), np.zeros(len(stiffness))
         findings.compare("load", point["angle"], angle, 360.0, f"{at}.angle")
         unit[places] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        has_factor = "factor" in point  # no load in this direction breaks a bond otherwise
+        has_factor = "factor" in point  # else no load in this direction breaks a bond
         imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
         strain = np.array(point["strain"]) if has_factor else imposed
         shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)

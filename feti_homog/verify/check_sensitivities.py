@@ -1,4 +1,4 @@
-"""The law of sensitivities: if constants of the case change, energies change as the file says."""
+"""Check sensitivities: if constants of the case change, energies change as the file says."""
 
 import copy
 from collections.abc import Mapping
@@ -58,7 +58,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _parameters(cell: DiscreteCell) -> set[str]:
-    """Return all constants of phases and springs on which the result depends.
+    """Return the names of all phase and spring constants on which the result depends.
 
     Names end in .k for one of several numbers, in .Cij or .kij for an entry of a stiffness or conductivity.
     """
@@ -83,10 +83,10 @@ def _parameters(cell: DiscreteCell) -> set[str]:
 
 
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check constants of a stiffness and their derivatives `slope` (v, v) along `direction` (parameters,).
+    """Check effective constants and their derivatives `slope` (v, v) along `direction` (parameters,).
 
-    At fixed contact status, energies are stationary, so that the diagonal C_kk is checked.  Other derivatives need
-    fields under other loads with the same status, which are not in the files: only the values are checked.
+    At fixed contact status, energies are stationary, which gives the derivatives of the diagonal C_kk.  Others need
+    fields under other loads with the same status, which are not in the files: there only values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
     k, heat = document.get("effective_conductivity"), document.get("thermal_stress")
@@ -170,7 +170,7 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """Compute the energies of fields under strains with all unit loads, (v, v) or (6, 7), by constants of `case`."""
+    """Compute mutual energies per area of strain states with all states, (v, v) or (6, 7), by constants of `case`."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)
@@ -179,7 +179,7 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
     # u - E x at the nodes does not change.
     for c, R in zip(fibres.centre, fibres.radius, strict=True) if growth else ():
         gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
-        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
+        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least gap, -2 R, is to the fibre itself
         d = from_centre(x, c, files.size)
         r = np.hypot(*d.T)
         V += growth * d * (R / np.maximum(r, R) * np.clip(1 - (r - R) / half, 0.0, 1.0))[:, None]

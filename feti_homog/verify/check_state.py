@@ -38,7 +38,7 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
     jump = cell.in_axes(state.jump)
     integrals = (cell.elements.node_integrals + cell.void_integrals + cell.side_integrals)[cell.nodes.node]
-    # A void adds its fraction of E and int sym(u* (x) n) ds, which is closed even where the cell boundary cuts the
+    # A void adds its fraction of E and int sym(u* (x) n) ds, a closed integral even where the cell boundary cuts the
     # void.
     slope = state.fluctuation.T @ cell.void_integrals - jump.T @ cell.faces.sums(integrals, of_fibre=False)
     openings = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
@@ -63,8 +63,8 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
 
-    Forces on faces balance with the traction, and those on sides with Sigma n if it is given; given displacements on
-    sides are E x.  The rounding of all nodes adds to the reaction of the fixed node, u* = 0.
+    Forces on faces balance the traction; on the sides of the cell they balance Sigma n if prescribed, and prescribed
+    displacements are E x.  The reaction of the fixed node, u* = 0, contains the rounding of all nodes.
     """
     nodes, traction, largest = cell.nodes, interface_forces(cell, state), cell.largest_displacement(state)
     # Periodic copies lie in one subdomain.  Glued nodes have one number: the places have even numbers, and the fibre
@@ -245,7 +245,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Compute the utilisation 1 / f (n,) of all `MODES`, a f^2 + b f = 1; both matrix modes near 0."""
+    """Compute utilisations 1 / f (n,) of `MODES`, a f^2 + b f = 1; near S11 + S22 = 0 both matrix modes count."""
     zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]

@@ -1,4 +1,4 @@
-"""The stiffness of every phase, from the constants of the case by the three-dimensional compliance."""
+"""Compute the stiffness of every phase from the constants of the case, by the three-dimensional compliance."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -53,7 +53,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
-    """Return whether quadratic elements of phases (phases,) have a bubble and a pressure.
+    """Return for each phase (phases,) whether its quadratic elements have a bubble and a pressure.
 
     Elements of isotropic phases are mixed, except in plane stress and conduction.  In an isotropic phase one modulus
     and one ratio give all constants, up to rounding.  Raises like `laws`.
@@ -70,7 +70,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return n eps times the ratio of volumetric to least compliance, and times the contrast of the stiffnesses."""
+    """Return 6 eps times the largest ratio of volumetric to least compliance, and times the stiffness contrast."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # of an incompressible phase, pressures have own limits
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
@@ -109,16 +109,16 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Return the constant `stiffness`, (3, 3) or (6, 6); (0, 0) if it is missing."""
+    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6); an empty array (0, 0) without it."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 
 
 def _compliance(constants: Constants) -> Float:
-    """Compute the compliance (6, 6) in the material axes.
+    """Compute the compliance S (6, 6) in the material axes.
 
-    Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine it; plane stress needs
-    fewer constants, and the others have arbitrary stable values.
+    Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine S; plane stress needs fewer
+    constants, and the others have arbitrary stable values.
     """
     if "stiffness" in constants:
         return np.asarray(np.linalg.inv(_given_stiffness(constants)), float)
@@ -145,7 +145,7 @@ def _compliance(constants: Constants) -> Float:
 
 
 def turned(stiffness: Float, degrees: float) -> Float:
-    """Compute C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs for C' turned by `degrees` from x1 to x2."""
+    """Rotate a stiffness C' by `degrees` from x1 to x2: C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs."""
     voigt = VOIGT[len(stiffness)]
     turn = _turn(degrees, len(voigt))
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
@@ -155,7 +155,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """Compute the rotation matrix R (axes, axes) for a turn from x1 to x2."""
+    """Compute the rotation matrix R (axes, axes) from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

@@ -1,4 +1,4 @@
-"""The cell of a result: elements, torn nodes, interface faces, and the scales of its states."""
+"""Build the cell of a result: elements, torn nodes, interface faces, and the scales of its states."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -66,7 +66,7 @@ class DiscreteCell:
     Attributes:
         stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain.
         expansions: (phases, v) strain per temperature, 0 if unknown.
-        constituent: (subdomains,) connected part of a phase.
+        constituent: (subdomains,) number of the connected part of a phase to which a subdomain belongs.
         inner: (s,) whether a torn side is the inner face of bonds that may break.
         fractions: (phases,) area fractions.
         largest_strain: largest strain component of all states.
@@ -123,7 +123,7 @@ class DiscreteCell:
 
     @property
     def area(self) -> float:
-        """Return the area of the rectangle."""
+        """Return the area of the cell, voids included."""
         return float(self.files.size.prod())
 
     @property
@@ -144,7 +144,7 @@ class DiscreteCell:
         return np.asarray(row_of[self.sides.nodes[self.inner]])
 
     def tips(self, status: AnyInt) -> Bool:
-        """Return whether nodes (k,) are tips: bonds beside a broken bond."""
+        """Return which nodes (k,) are tips: bonds beside a broken bond."""
         rows, broken, has_broken_neighbour = self.inner_rows, status != Status.BONDED, np.zeros(len(status), bool)
         pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
         pairs = pairs[(pairs >= 0).all(axis=1)].T
@@ -174,7 +174,7 @@ class DiscreteCell:
 
     @cached_property
     def void_integrals(self) -> Float:
-        """Return `integrals` (n, 2) along voids."""
+        """Return `integrals` (n, 2) along the boundaries of voids."""
         return self.integrals(self.sides.at_void)
 
     @cached_property
@@ -183,7 +183,7 @@ class DiscreteCell:
         return self.integrals(self.sides.on_side)
 
     def integrals(self, which: Bool) -> Float:
-        """Compute int N_a n ds (n, 2), n inwards: sum_b int N_a dN_b/ds x_b on a side, turned to the normal."""
+        """Compute int N_a n ds (nodes, 2), n inwards: sum_b int N_a dN_b/ds x_b on a side, rotated to the normal."""
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
         nodes = self.sides.nodes[which]
         M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2
@@ -206,7 +206,7 @@ class DiscreteCell:
 
     @cached_property
     def _scales_on_path(self) -> list[Scales]:
-        """Return the scales of all path points with friction, where rounding of earlier tractions remains."""
+        """Return the scales of all path points if there is friction, which keeps earlier rounding; else []."""
         points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
         return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
 
@@ -221,5 +221,5 @@ class DiscreteCell:
 
     @property
     def rounded_energy(self) -> float:
-        """Return a floor (energy per area) for energy scales: a cell without bonds may store only rounding."""
+        """Return a floor (energy per area) for energy scales: a cell without bonds stores only rounding errors."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -1,4 +1,4 @@
-"""Triangles with three or six nodes, for the certificate alone: displacements to strains, stresses and forces.
+"""Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
 
 Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
 orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a = r_a, or
@@ -17,7 +17,7 @@ from feti_homog.verify.reading import Mesh
 ELEMENTS_AT_ONCE = 1 << 15
 # (c, 2) position of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
-# r_a is the sum of N_a and half of N_b of the middle nodes b on both sides at vertex a.
+# r_a is N_a plus half of N_b for the middle nodes b of both sides at vertex a.
 OF_NODES = np.array([[2, 0, 0, 1, 0, 1], [0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
 # Components of normal stresses, by the number of stresses.
 NORMAL = {3: [0, 1], 6: [0, 1, 2]}
@@ -29,9 +29,9 @@ class ElementFields:
 
     Attributes:
         strain, stress: (m, v) element means.
-        strain_size: (m,) size of the terms that the strain sums, which bounds its rounding.
+        strain_size: (m,) size of the terms whose sum is the strain, which bounds the rounding.
         force: (n, c) int B^T sigma.
-        force_size: (n,) size of the terms that the force sums.
+        force_size: (n,) size of the terms whose sum is the force.
         largest_force: largest nodal force of a single element.
         energy: int sigma : eps.
     """
@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu of mixed elements, and largest mu of all / least mu of mixed; or 0."""
+        """Return the largest lambda / mu of mixed phases, and largest mu / least mu of mixed phases; or 0."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))

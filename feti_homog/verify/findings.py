@@ -1,4 +1,4 @@
-"""The laws of the certificate with limits and largest violations, and the numbers that no law reads.
+"""List the laws of the certificate with their limits, record violations, and find numbers that no law reads.
 
 Rounding.  Sums over fields err by a few units in the last place of their terms; quantities from factorizations in the
 solver err by a few hundred: forces in a mesh with 119 000 elements by at most 1.3e-12.  In a very stiff phase, where
@@ -6,7 +6,7 @@ strains are differences of nearly equal displacements, rounding is 1e-15 of the 
 times the measured errors.
 
 Solver.  The Krylov method leaves relative jumps of `rtol`; laws of closed faces hold to the tolerance of the checks in
-a run, min(1000 rtol, 1e-4).  As `rtol` is an entry of the result, 1e-4 bounds what a result may claim.
+a run, min(1000 rtol, 1e-4).  As `rtol` is an entry of the result, 1e-4 bounds the tolerance that a result may claim.
 """
 
 import re
@@ -25,9 +25,9 @@ CHECK_PER_RTOL, LARGEST_CHECK, KKT = 1e3, 1e-4, 1e-6
 CONTACT_PER_RTOL = 100.0
 # Bonds whose utilisations differ by less than 1e-6 break together.
 STRENGTH = 2e-6
-# Relative step of finite differences of energies, and their relative error.
+# Relative step of finite differences of energies, and relative error of these differences.
 STEP = 1e-6
-# Relative differences that count as rounding: between loads in proportion, and in energies and strains near 0.
+# Relative differences that count as rounding: between proportional loads, and in energies and strains near 0.
 ROUNDING = 1e-9
 # Coordinates in a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
 USERS_MESH = 1e-5
@@ -35,7 +35,7 @@ USERS_MESH = 1e-5
 BODIES, COATINGS = 1e-11, 1e-7
 # Limits grow with lambda / mu above LARGE_RATIO; limits of forces and stresses at most with the contrast of mu to
 # stiffer phases, above LARGE_CONTRAST and LARGE_OF_PRESSURE.  At ratios of 1e5 to 5e8 and contrasts of 1e-3 to 1e6,
-# violations are at most a quarter of the limits, and 0.9 of the limit of jumps.
+# violations are at most a quarter of the limits, for jumps 0.9 of the limit.
 LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
 
 Place = str | Callable[[int], str]
@@ -108,7 +108,7 @@ class Findings:
 
 
 def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
-    """Compute |errors| / scale; for the scale 0, the result is 0 without an error, else inf."""
+    """Compute |errors| / scale; where the scale is 0, the result is 0 for an error of 0, else inf."""
     errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
     return np.asarray(np.divide(errors, scale, out=np.where(errors == 0.0, 0.0, np.inf), where=scale > 0))
 
@@ -121,10 +121,10 @@ def solver_limit(rtol: float) -> float:
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
     """List the laws with their limits and without violations, for a tolerance `rtol` of the dual problems.
 
-    `phases` has both numbers of `Elements.contrasts`, then both of `constitutive_law.rounding`.
+    `phases` has the two numbers of `Elements.contrasts`, then the two of `constitutive_law.rounding`.
     """
     ratio, contrast, of_law, of_contrast = phases[0] / LARGE_RATIO, *phases[1:]
-    # Factors by which limits grow with nearly incompressible phases.
+    # Factors by which nearly incompressible phases raise the limits.
     loss, balance_loss = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
     law = max(1e-13, 1e-13 * min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE), of_law)
     sums, balance = max(1e-10 * loss, of_law), 1e-10 * balance_loss

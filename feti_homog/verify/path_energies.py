@@ -1,4 +1,4 @@
-"""Laws of energies on a path: the work is stored, lost where bonds break, or becomes heat by friction.
+"""Check the energies on a path: work is stored, lost where bonds break, or becomes heat by friction.
 
 E and Sigma are all strains at a point, with a temperature as the last strain, and their conjugates; W = E.Sigma / 2 is
 the stored energy.  For fixed bonds W is a convex function of E, homogeneous of degree two.  A load prescribes strains
@@ -92,7 +92,7 @@ def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None
             findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
     by_events = cell.files.case["path"]["method"] == "events"
     # Under strain control the load never falls on the first leg of events: a break at a load below the largest so far
-    # happens at the largest load, and loses more by the square of the ratio.
+    # counts at the largest load, and the loss grows by the square of the ratio.
     names = "dissipated", "dissipated_strain_controlled", "load_factor", "stored"
     lost, rising, factor, stored = np.array([[point[name] for name in names] for point in points]).T
     first_leg = 1.0 / len(targets(cell.files.case)) if by_events else 0.0
@@ -107,7 +107,7 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that the work is stored, lost in breaks, or becomes heat.
 
     Heat never falls, and `dissipated` changes only in breaks.  With friction the energy depends on the path, so that
-    the loss in breaks has no bounds.  Bonds break after the point of an event, before the point of an increment.
+    the loss in breaks has no bounds.  Bonds break after the point of an event, and before the point of an increment.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
@@ -182,8 +182,8 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
     """Check the work, and the loss in breaks by (P).
 
     The loss is the potential with the old bonds minus the potential with the new bonds, at the load of the break: after
-    the point of an event, or at the end of an increment.  There, fully bonded phases at the strain of the new state
-    store at least as much as the old bonds would.
+    the point of an event, or at the end of an increment.  There, Voigt's mean stiffness at the new strain stores at
+    least as much as the cell with the old bonds.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)

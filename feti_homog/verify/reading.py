@@ -1,4 +1,4 @@
-"""Readers of a result folder: result.json with the case, result.h5 with mesh, interface and states."""
+"""Read a result folder: result.json with the case, result.h5 with mesh, interface and states."""
 
 import json
 import os
@@ -29,7 +29,7 @@ COATING = "coating"  # phase
 class Mesh:
     """The mesh: nodes (n, 2) and elements (m, 3 or 6).
 
-    An element has its vertices, then the middles of the sides 01, 12, 20.  Subdomains share no node; phase 0: matrix.
+    An element lists its vertices, then the mid-side nodes 01, 12, 20.  Subdomains share no node; phase 0: matrix.
     """
 
     points: Float
@@ -56,7 +56,7 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN if a fibre has none.
+    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN where they are undefined.
 
     `strength` (f,) is the strength of bonds / the strength in the case.
     """
@@ -78,7 +78,7 @@ class State:
     """A state, the group /state/K of result.h5.
 
     Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain c = 3 and v = 6, in the
-    order [11, 22, 33, 23, 13, 12].  In conduction displacement 3 is the temperature, stress [33, 23, 13] -flux.
+    order [11, 22, 33, 23, 13, 12].  In conduction, displacement 3 is the temperature; stresses [33, 23, 13] are -flux.
 
     Attributes:
         strain, mean_stress: (v,) macroscopic strain E and stress Sigma.
@@ -124,7 +124,7 @@ def gradient(strain: Float) -> Float:
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """An open result folder; `size` (2,) belongs to the cell, `altered` names files changed since the run."""
+    """An open result folder; `size` (2,) is the size of the cell, `altered` names files changed since the run."""
 
     document: Section
     size: Float
@@ -163,7 +163,7 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]], conductances as axial stiffnesses; empty if all bonds are perfect."""
+        """Return the sections [[interface]], with conductances as axial stiffnesses; empty if all bonds are perfect."""
         sections: Any = self.case.get("interface", [])
         sections = sections if isinstance(sections, list) else [sections]
         return [{"axial_stiffness": row["conductance"], **row} if "conductance" in row else row for row in sections]
@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Open the results in a folder; raise CaseError, one line, if a file is unreadable."""
+    """Open the results in a folder; raise a one-line CaseError if a file is unreadable."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {

@@ -1,7 +1,7 @@
-"""Cohesive laws t(delta) in the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
+"""Evaluate cohesive laws t(delta) of the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
 K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.  Damage grows in steps, the
-teeth, between discrete levels.  A branch gives t / peak in u = (delta - delta_0) / stretch.
+teeth, between discrete levels.  A branch gives t / peak as a function of u = (delta - delta_0) / stretch.
 """
 
 from abc import abstractmethod
@@ -16,7 +16,7 @@ from feti_homog.verify.bonds import QuadraticStrength, pulled
 
 TAIL = 0.01  # traction / peak at the beginning of the last tooth of an exponential branch
 MODES = np.linspace(0.0, np.pi / 2, 33)
-# Largest difference of the energy absorbed in changing modes from the range of constant modes, relative.
+# Largest relative distance of the energy absorbed under changing modes from the range over constant modes.
 BETWEEN_MODES = 0.25
 
 
@@ -46,7 +46,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) for damage that rises from `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area (k,) absorbed as damage rises from `before` to `after` (k,), in modes psi (k,)."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -69,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute the damage (n + 1,) between n teeth: constant quotients of openings in the harder pure mode."""
+        """Compute the damage levels (n + 1,) of n teeth: openings in geometric progression, in the longer pure mode."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))

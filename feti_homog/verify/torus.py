@@ -1,6 +1,6 @@
-"""Places on the torus of the periodic cell: torn nodes and sides at a place, and the bodies that meet there.
+"""Find torn nodes and sides at places on the torus of the periodic cell, and the bodies that meet there.
 
-The `shift` (2,) between images is the size of a periodic cell, and None if other conditions hold on its sides.
+The `shift` (2,) between images is the size of a periodic cell; None for other conditions on the sides.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class TornSides:
         normal: (s, 2) outward normal times chord length.
         partner: (s,) other side at the same place of the torus; -1 if none or several.
         alone: (s,) whether a side has no other side at its place.
-        on_side: (s,) whether such a side lies on a side of a cell that is not periodic; else it is at a void.
+        on_side: (s,) whether an `alone` side lies on the boundary of a non-periodic cell; others are at voids.
     """
 
     element: Int
@@ -45,7 +45,7 @@ class TornSides:
 
 @dataclass(frozen=True)
 class TornNodes:
-    """The b nodes on torn sides: their number in the mesh, place on the torus, subdomain and phase, (b,)."""
+    """The b nodes on torn sides: (b,) numbers in the mesh, places on the torus, subdomains and phases."""
 
     node: Int
     place: Int
@@ -112,7 +112,7 @@ def same_places(points: Float, shift: Float | None, radius: float) -> Int:
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
     """Return whether two bodies meet along one line at places (places,).
 
-    `part` (m,) is the body of an element.  Both bodies then end at two sides, not all alone; middle nodes always do.
+    `part` (m,) is the body of an element.  There each body ends at two sides, not all alone; middle nodes always fit.
     """
     apart = ~sides.alone & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)

@@ -1,4 +1,4 @@
-"""The generation of a coarse mesh from an arrangement of fibres, or from an image.
+"""Generate a coarse mesh from an arrangement of fibres, or from an image.
 
 Imports `case`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.tiles` and `microstructure`.  Main entries:
 `gmsh_mesher.begin` and `gmsh_mesher.NodedCell`.

@@ -1,4 +1,4 @@
-"""The coarse mesh of a label image within smooth outlines: contours by marching squares, filled by gmsh.
+"""Mesh a label image within smooth outlines: contours by marching squares, filled by gmsh.
 
 The cell sides run through pixel centres. Contours cross opposite sides at the same positions, so that sides match.
 """
@@ -31,7 +31,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
     Raises:
         CaseError: scikit-image is not installed.
-        MeshError: three phases touch each other, or gmsh cannot fill the outlines.
+        MeshError: three phases touch each other, elements are too many, or gmsh cannot fill the outlines.
     """
     try:
         from skimage import measure
@@ -40,7 +40,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
     mask = _every_other(phase, phases)
     indicator = gaussian_filter(mask.astype(float), 1.0, mode="wrap")
     level = float(np.quantile(indicator, 1.0 - mask.mean(), method="midpoint"))
-    # The sides run where they cross contours most steeply.
+    # The cell sides run where they cross contours most steeply.
     away = np.abs(indicator - level)
     across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
     i = int(np.argmax(across[0]))
@@ -70,7 +70,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         occ.synchronize()
         try:
             content = filled(gmsh, size, field)
-        except Exception as error:  # gmsh raises nothing more special
+        except Exception as error:  # gmsh raises only Exception
             advice = "expected larger regions of a phase: filter the image, or smooth = false"
             raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
@@ -116,7 +116,7 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
     """Assign the prevailing phase of its elements to each surface, and remove the elements of voids.
 
-    Edges with a rise of more than 0.2 lengths, which turn by more than 87 degrees, become straight.
+    Edges that rise by more than 0.2 of their length, and so turn by more than 87 degrees, become straight.
     """
     ((tags, nodes, entity),) = (rows for kind, rows in content.elements.items() if kind.startswith("Triangle"))
     order, points = np.argsort(content.tags), content.points.copy()

@@ -1,4 +1,4 @@
-"""The steps from a cell section to a coarse periodic mesh: lines, nodes on the lines, tiles, triangles."""
+"""Turn a cell section into a coarse periodic mesh: lines, nodes on the lines, tiles, triangles."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def begin(
     Args:
         listed: the arrangement of a table; None for other cells, which may be large.
         marks: directions of debond tips, where the mesh gets nodes. A mark within MERGED of another mark, or of a
-            crossing of the circle with the cell boundary, moves there.
+            crossing of the circle with the cell boundary, moves onto it.
         policy: rules for the division into tiles.
 
     Raises:
-        MeshError: the fibres cannot be arranged, or the mesh would have too many elements.
+        MeshError: the fibres cannot be arranged or are too small, or the mesh would have too many elements.
     """
     sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = element_estimate.ElementEstimate.of(cell, listed)

@@ -1,4 +1,4 @@
-"""The coarse mesh of a label image: its pixels, or regions within smooth outlines."""
+"""Make the coarse mesh of a label image: from its pixels, or from regions within smooth outlines."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     """Read the mesh file or the image of a cell.
 
     Raises:
-        CaseError, MeshError: as `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`.
+        CaseError, MeshError: as for `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`.
     """
     assert cell.file is not None
     if cell.geometry == "mesh":
@@ -58,7 +58,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List pixels that voids part from all others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
+    """List pixels that voids cut off from others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     part, faults = components(len(solid), *Torus.of(mesh).sides[:2]), []
     sizes = np.bincount(part)

@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a cell with any convex outlines, which gmsh cuts at the cell sides and fills.
+"""Mesh a periodic cell with any convex outlines, which gmsh cuts at the cell sides and fills.
 
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """
@@ -27,7 +27,7 @@ from feti_homog.typing import Float
 SAME_PLACE = 1e-6
 # Fewest and most grid cells along a side, for the grid of sizes that gmsh reads.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-# Edge length on a coating / thickness; cosine between the normals of outline and side, above which both face.
+# Edge length on a coating / thickness; cosine between outline and side normals, above which they face each other.
 COATING_EDGE, FACING = 2.0, 0.9
 # Number of sources that contribute to the size at a position.
 NEAREST = 12

@@ -1,4 +1,4 @@
-"""The lines of a cell with discs or ellipses, cut at crossings; all ranks then place nodes on the lines."""
+"""Cut the lines of a cell with discs or ellipses at crossings; all ranks then place nodes on the lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arcs of ellipses, and the edge sizes of cells with ellipses."""
+"""Build the arcs of ellipses, and the edge sizes of cells with ellipses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The edge sizes on the cell lines, smaller on circles and at debond tips."""
+"""Compute the edge sizes on the cell lines, smaller on circles and at debond tips."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class MeshSizes:
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Return whether the mesh is finer on circles or at tips than elsewhere.
 
-        Thin coatings and tiny discs make the mesh finer, too.
+        Thin coatings and tiny discs also make the mesh finer.
         """
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
@@ -163,8 +163,8 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """Return the edge size on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
-    of the cell, with h_k proportional to the passage width. The mandatory `vertices` (v, 2) are sources, too, where h_k
-    is the distance to the next vertex.
+    of the cell, with h_k proportional to the passage width. The mandatory `vertices` (v, 2) are also sources, with the
+    distance to the next vertex as h_k.
 
     The size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one
     of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.

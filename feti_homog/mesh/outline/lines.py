@@ -1,4 +1,4 @@
-"""The cell lines (pieces of sides, arcs and bridges), and the placement of nodes by edge sizes."""
+"""Represent the cell lines (pieces of sides, arcs and bridges), and place nodes by edge sizes."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
-        """Concatenate the nodes of lines, part after part.
+        """Concatenate the nodes of all parts, in the order of the parts.
 
         Raises:
             MeshError: all parts together have more than `limit` edges.
@@ -237,8 +237,8 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
     line = np.repeat(np.arange(len(edges)), edges + 1)
     target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]
     target[first[1:] - 1] = total
-    # Interpolate between samples in one ascending row of all lines, 1 apart; the rounding of large sums may miss an
-    # interval by one.
+    # Interpolate in one ascending row with the samples of all lines, which are 1 apart; the rounding of large sums may
+    # shift the interval by one.
     shift = np.concatenate([[0.0], np.cumsum(total + 1)])[: len(last)]
     row = measure + np.repeat(shift, counts)
     j = np.searchsorted(row, target + shift[line], side="right") - 1

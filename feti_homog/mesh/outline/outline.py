@@ -1,4 +1,4 @@
-"""The cell lines with nodes, and the preceding steps: images, vertices, arcs and pieces of sides."""
+"""Build the cell lines with nodes from images, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from feti_homog.errors import MeshError
 from feti_homog.schema import wording
 
-# Keywords of the reader, and the allowed parameters; None allows any parameters.
+# Keywords that the reader uses, and the allowed parameters; None allows any parameters.
 READ: dict[str, tuple[str, ...] | None] = {
     "NODE": ("NSET", "SYSTEM"),
     "ELEMENT": ("TYPE", "ELSET"),

@@ -24,11 +24,11 @@ from feti_homog.schema import wording
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 
-# Names in gmsh of lines, and of triangles and quadrilaterals.
+# The names in gmsh for lines, and for triangles and quadrilaterals.
 LINES = ("Line 2", "Line 3")
 TRIANGLES = ("Triangle 3", "Triangle 6", "Quadrilateral 4", "Quadrilateral 9", "Quadrilateral 8")
 VERSION = re.compile(rb"2(\.[0-2]?0*)?|4(\.[01]?0*)?")
-# Sections for gmsh, and other sections without nodes or elements.
+# Sections passed to gmsh, and other known sections, without nodes or elements.
 GIVEN = ("MeshFormat", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
 OTHERS = {"Comments", "Periodic", "GhostElements", "Parametrizations", "NodeData", "ElementData", "ElementNodeData"}
 OTHERS |= {"InterpolationScheme"}
@@ -65,7 +65,7 @@ class MshContent:
         tags, points, _ = model.mesh.getNodes()
         groups, blocks = {}, defaultdict[str, list[Elements]](list)
         for dimension, entity in model.getEntities():
-            physical = np.abs(model.getPhysicalGroupsForEntity(dimension, entity))  # negative where turned
+            physical = np.abs(model.getPhysicalGroupsForEntity(dimension, entity))  # negative for reversed entities
             groups[dimension, entity] = tuple(physical.tolist())
             for kind, numbers, nodes in zip(*model.mesh.getElements(dimension, entity), strict=True):
                 rows = nodes.astype(np.int64).reshape(len(numbers), -1)
@@ -168,7 +168,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
             try:
                 gmsh.merge(str(path))
                 refusals = []
-            except Exception:  # gmsh raises nothing more special
+            except Exception:  # gmsh raises only Exception
                 refusals = ["Error: the file is damaged"]
             if faults := [line for line in gmsh.logger.get() if not line.startswith(passed)] + refusals:
                 raise MeshError(f"gmsh cannot read it: {faults[0].partition(': ')[2]}")
@@ -178,7 +178,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
                 break
     if not only_groups:
         return content
-    # Other programs write only physical groups: a group stands for an entity.
+    # Some other programs write only physical groups: a group then stands for an entity.
     return replace(content, groups={key: (key[1],) if key[1] else () for key in content.groups})
 
 

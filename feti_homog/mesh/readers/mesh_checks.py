@@ -12,13 +12,13 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Float, Int, Int32
 
-# Coincident nodes up to which all pairs are listed: the number of pairs grows with the square of the nodes.
+# Number of coincident pairs below which all are listed: the number grows with the square of the nodes.
 MOST_PAIRS = 1000
-# Limit for pairs of an edge and a nearby node, whose number may grow with the square, too.
+# Limit for pairs of an edge and a nearby node, whose number may also grow with the square.
 MOST_CANDIDATES = 10**7
 # Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
-# Triangle area / square of the longest edge, up to which the area is zero but for rounding.
+# Triangle area / square of the longest edge, up to which the area is zero except for rounding.
 FLAT_AREA = 1e-9
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
@@ -136,7 +136,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 
 
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes that lie within inner edges with a single triangle.
+    """List nodes that lie on inner edges with a single triangle.
 
     `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
     """
@@ -208,7 +208,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         faults += _listed(
             before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
         )
-    # An element between bare sides would be a neighbour of itself.
+    # An element between bare sides would be its own neighbour.
     bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
     lines = [f"no node between the corners of the {', '.join(bare)} side: expected one at least"]
     return [*faults, *(lines if bare else [])]
@@ -235,7 +235,7 @@ def islands(raw: RawMesh, torus: Torus) -> list[str]:
 
 
 def void_faults(raw: RawMesh, torus: Torus, has_voids: bool) -> list[str]:
-    """List unexpected holes, voids without an area, touching voids, and uncovered areas."""
+    """List unexpected holes, voids without an area, touching voids, voids at sides with tractions, uncovered areas."""
     mesh, pairs = torus.mesh, torus.low_copies(torus.at_void)
     empty = 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:

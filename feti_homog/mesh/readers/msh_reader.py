@@ -32,7 +32,7 @@ HOLE = "expected no elements in a void, which is a hole in the mesh (with voids 
 Selectors = Mapping[str, tuple[str | int, ...]]
 # Sine of the turn at a hull node, up to which the node lies on a straight side.
 STRAIGHT = 1e-5
-# Slope up to which sides count as upright; fraction of the hull that a cell with voids fills at least.
+# Slope up to which sides count as upright; least fraction of the hull that a cell with voids fills.
 UPRIGHT, FILLED = 1e-2, 0.4
 
 
@@ -45,7 +45,7 @@ def read(
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
-    The file, of a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
+    The file, with a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
     "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`, and opposite
     sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are debonded
     from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses (`with_ellipses`);
@@ -218,7 +218,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
-    # Without a matrix, the user renames all groups, so that numbers are no further fault.
+    # Without a matrix, the user must rename all groups: numbers are then no further fault.
     faults = [
         f'{mesh.container} "{name}" is not a phase: {HOLE if name == phase_names.VOID else expected}'
         for name in names
@@ -230,7 +230,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
         return []
     faults[-1] += f"; {known_names(mesh)}"
     shares: dict[str, float] = {}
-    with np.errstate(all="ignore"):  # coordinates are judged later
+    with np.errstate(all="ignore"):  # coordinates are checked later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for group, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
             if group and group[0] != phase_names.VOID:

@@ -102,7 +102,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
     Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
-    chord. A triangle with two edges on one curve flips an edge: the curve has no corner between them.
+    chord. In a triangle with two edges on one curve, one flips: the curve has no corner there.
     """
     torus, nodes = Torus.of(mesh), len(mesh.points)
     pairs = torus.low_copies(torus.is_outline)
@@ -204,7 +204,7 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, with offsets d from the mean, is |F^-1 (d - c)| = 1; None if `_holds` is false.
+    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse or fails `_holds`.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()

@@ -30,11 +30,11 @@ TYPES = {"char": "i1", "short": "i2", "int": "i4", "long": "i8"}
 TYPES |= {f"unsigned_{name}": f"u{kind[1]}" for name, kind in TYPES.items()}
 TYPES |= {f"vtktype{name.lower()}": kind for name, kind in XML_TYPES.items() if "Int" in name}
 TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
-# Values for a cell or a point by section; the header of SCALARS may give another number.
+# Number of values per cell or point, by section; the header of SCALARS may give another number.
 WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
 # Cell sections of Medit: VTK cell type, number of nodes.
 CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
-# Number of values in an entry of each section: of cells, the nodes and a reference; of vectors, the dimension.
+# Number of values per entry of a section: for cells, the nodes and a reference; for vectors, the dimension.
 ENTRIES = {
     **dict.fromkeys(("CORNERS", "RIDGES", "REQUIREDVERTICES", "REQUIREDEDGES", "REQUIREDTRIANGLES"), 1),
     **dict.fromkeys(("NORMALATVERTICES", "TANGENTATVERTICES", "VERTEXONGEOMETRICVERTEX", "EDGEONGEOMETRICEDGE"), 2),

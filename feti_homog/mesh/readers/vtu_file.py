@@ -153,7 +153,7 @@ class _Arrays:
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Unpack data behind a header of lengths.  Raises ValueError or IndexError if data are missing."""
+        """Unpack the data that follow a header of lengths.  Raises ValueError or IndexError if data are missing."""
         header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
         count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
         lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []

@@ -1,4 +1,4 @@
-"""The tiles of a large cell: division, filling by gmsh, and union on the torus.
+"""Divide a large cell into tiles, fill the tiles by gmsh, and join the tiles on the torus.
 
 Imports `mesh`, `mesh.outline` and `microstructure`.  Main entries: `tiling.TilePolicy` and
 `tile_filling.fill`.

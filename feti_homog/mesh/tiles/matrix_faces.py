@@ -1,9 +1,9 @@
-"""The matrix between discs as faces of a planar graph, whose lines are bridges and cell sides.
+"""Represent the matrix between discs by the faces of a planar graph, whose lines are bridges and cell sides.
 
 A bridge is a straight line across the matrix between the facing points of neighbouring discs, normal to both circles.
 In a narrow gap, a bridge is about as long as the edges of the mesh, and allows good triangles.
 
-The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from either end.
+The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from each end.
 A half-line leaves a disc in the direction of the start point on the circle.
 """
 
@@ -56,7 +56,7 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     length = np.linalg.norm(vector, axis=1)
     normal = vector / length[:, None]
     clearance = np.full(len(ends), np.inf)
-    # Discs of about one radius at a time, so that searches omit small discs far from a line.
+    # Discs of similar radii at a time, so that searches omit small discs far from a line.
     classes = np.floor(np.log2(radii / radii.min())).astype(int)
     for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
         tree, reach = cKDTree(centres[members]), (1 + CLEAR) * radii[members].max()
@@ -135,7 +135,7 @@ class HalfLines:
         """
         node, start = nodes.T.ravel(), np.concatenate([starts[:, 0], starts[:, 1]])
         other = np.concatenate([starts[:, 1], starts[:, 0]])
-        # At a corner, the start point is the centre: the direction is that of the other end.
+        # At a corner, the start point is the centre: then the other end gives the direction.
         offset = np.where(np.all(start == centres[node], axis=1)[:, None], other, start) - centres[node]
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
@@ -170,7 +170,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,).
 
-    The next half-line clockwise has the label among `label` (h,), a disc without half-lines among `alone` (n,).
+    `label` (h,) has the label of the next half-line clockwise, `alone` (n,) the label of a disc without half-lines.
     """
     order = np.lexsort((lines.angle, lines.node))
     node, line_angle = lines.node[order], lines.angle[order]
@@ -186,7 +186,7 @@ def matrix_tiles(
 ) -> MatrixTiles | None:
     """Distribute the matrix faces to the cells of a grid (2,) by centroids.
 
-    None if a disc, or a group of discs without bridges to the sides, has no face.
+    Returns None if no centre line assigns a disc, or a group of discs without bridges to the sides, to a face.
 
     Args:
         circles: (k, 3) centres and radii.
@@ -213,8 +213,8 @@ def matrix_tiles(
     end, which = half.start[half.twin], np.tile(loop, 2)
     a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    # A face has one outer loop, and negative inner loops. The face beyond the sides has no outer loop. Loops around
-    # trees contain both halves of all lines, and have no area but for rounding.
+    # A face has one outer loop, and inner loops of negative area. The face beyond the sides has no outer loop. Loops
+    # around trees contain both halves of all lines, and have no area except for rounding.
     is_tree = np.bincount(loop, loop[half.twin] != loop) == 0
     around = np.bincount(face[:count], (np.bincount(which, cross) > 0) & ~is_tree, face.max() + 1)
     beyond = face[loop[half.twin[0]]]

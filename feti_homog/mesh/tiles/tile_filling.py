@@ -16,8 +16,8 @@ from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves
 from feti_homog.microstructure import arrangements
 from feti_homog.typing import Array, Float, Int, Int32
 
-# An algorithm of gmsh. The default makes better triangles of one size, but fails in a disc with thousands of nodes on
-# the circle.
+# Number of gmsh's Delaunay algorithm. The default makes better triangles of one size, but fails in a disc with
+# thousands of nodes on the circle.
 DELAUNAY = 5
 
 # A closed line: inner area, negative for a clockwise line, corners x + i y (k,), and tags of the gmsh lines, negative
@@ -65,7 +65,7 @@ def gmsh_session() -> Iterator[ModuleType]:
     """Run gmsh in a context, silently, with fixed options and an empty model."""
     import gmsh
 
-    gmsh.initialize(["gmsh", "-v", "0", "-skip_petscrc"], False, interruptible=False)  # it starts a PETSc
+    gmsh.initialize(["gmsh", "-v", "0", "-skip_petscrc"], False, interruptible=False)  # gmsh starts PETSc
     try:
         options = {"General.Terminal": 0, "General.NumThreads": 1, "Mesh.RandomSeed": 1, "Mesh.Renumber": 0}
         for option, value in {**options, "General.Verbosity": 5}.items():
@@ -120,7 +120,7 @@ def fill(tile: Tile) -> Filling:
 
 def _unfilled(tile: Tile, why: str) -> MeshError:
     curves = tile.curves
-    # If a side cuts a disc, pieces are on the opposite side of the cell.
+    # If a side cuts a disc, pieces of the disc are on the opposite side of the cell.
     in_matrix = np.flatnonzero((curves.inside == MATRIX) | (curves.outside == MATRIX))
     points = tile.points[curves.chosen(in_matrix).node] if len(in_matrix) else tile.points
     (x, y), (right, top) = points.min(axis=0), points.max(axis=0)

@@ -1,6 +1,6 @@
-"""Tiles of a large cell: parts of the outline that ranks fill independently, with common nodes on common borders.
+"""Divide a large cell into tiles, which ranks fill independently, with common nodes on common borders.
 
-Tiles depend on the cell alone, so that the mesh is the same on any rank count.  A rank has the torus of the tiles
+Tiles depend on the cell alone, so that the mesh is the same for any rank count.  A rank has the torus of the tiles
 that the rank has filled: outline numbers identify nodes on lines, the following numbers identify nodes within tiles,
 tile by tile, and the two classes of a torus edge determine the number of the edge.
 """

@@ -1,4 +1,4 @@
-"""Outlines of fibres: discs, ellipses, rounded polygons and other convex curves, and the table rows that have them.
+"""Represent fibre outlines: discs, ellipses, rounded polygons and other convex curves; build them from table rows.
 
 Imports nothing.  Main entries: `convex_sums.Outlines`, `shapes.SHAPES`.
 """

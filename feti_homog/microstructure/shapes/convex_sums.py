@@ -1,4 +1,4 @@
-"""Outlines of any convex shape: sums of a polygon and an ellipse; among them rounded polygons."""
+"""Represent outlines of any convex shape, such as rounded polygons, by sums of a polygon and an ellipse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Discs, and ellipses as affine images of the unit circle: points, tangents, curvature and distances."""
+"""Represent discs, and ellipses as affine images of the unit circle: points, tangents, curvature, distances."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squared semi-axes, up to which an ellipse is a circle.
 SAME_AXES = 1e-12
-# The least ratio of shorter to longer semi-axis; thinner tips would need too small elements.
+# The least ratio of the shorter to the longer semi-axis; thinner tips would need too small elements.
 THINNEST = 0.05
 
 
@@ -128,7 +128,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, as `ConvexSums.parting`."""
+        """Find the directions that best separate pairs, like `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -253,7 +253,7 @@ class Discs(ConvexCurves):
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Separate pairs along the vectors between centres, or along x for zero vectors, as `ConvexSums.parting`."""
+        """Separate pairs along the vectors between centres, or along x for zero vectors; see `ConvexSums.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]

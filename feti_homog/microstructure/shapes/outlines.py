@@ -1,4 +1,4 @@
-"""The base class of all fibre outlines, the ranges of table columns, and the widest gap between two curves."""
+"""Define the base class of fibre outlines and the ranges of table columns; find the widest gap between curves."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace

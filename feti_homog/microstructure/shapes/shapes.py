@@ -1,4 +1,4 @@
-"""The shapes that table rows may have, and the outlines of all rows."""
+"""List the shapes that table rows may have, and build the outlines of all rows."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes in a table with or, unless `has_tips`, without tip nodes in their meshes."""
+    """Return the shapes in a table whose meshes may have tip nodes or, unless `has_tips`, have none."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 

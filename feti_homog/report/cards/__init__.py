@@ -1,4 +1,4 @@
-"""Effective constants as material cards of other programs: Abaqus, CalculiX, ANSYS, MOOSE, and as a table.
+"""Write effective constants as material cards for Abaqus, CalculiX, ANSYS and MOOSE, or as a table.
 
 Imports `materials`, `report.text` and `results`.  Main entry: `export.card`.
 """

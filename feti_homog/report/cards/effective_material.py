@@ -1,4 +1,4 @@
-"""The effective material of a result in card axes (axis 1 along the fibre), text of all cards, cards of conductors.
+"""Express the effective material of a result in card axes (axis 1 along the fibre); write conductor cards.
 
 Abaqus Keywords Guide and CalculiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS: KXX, KYY, KZZ.
 """
@@ -23,7 +23,7 @@ PAIRS: list[tuple[int, ...]] = [(int(name[1]) - 1, int(name[2]) - 1) for name in
 ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
 """The indices of a card's components in the order of the cell: C_card = C_cell[ORDER][:, ORDER]."""
 COUPLINGS = ~np.eye(6, dtype=bool)
-"""(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
+"""(6, 6) entries at which the stiffness of an orthotropic material is 0 in material axes."""
 COUPLINGS[:3, :3] = False
 AXES = (
     "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So "
@@ -89,7 +89,7 @@ class EffectiveMaterial:
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """Return the material of a result with stiffness and expansion as computed.
 
-    The material is orthotropic if the other entries are negligible.
+    The material is orthotropic if all other entries are negligible.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
@@ -210,7 +210,7 @@ def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
 
 
 def number(value: float, width: int = 24) -> str:
-    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` is at least 12."""
+    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` must be at least 12."""
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)

@@ -1,19 +1,19 @@
-"""`feti-homog export`: the material card of a result folder, for another program or as a table.
+"""`feti-homog export`: write the material card of a result folder, for another program or as a table.
 
 Abaqus Keywords Guide, *ELASTIC and *EXPANSION: engineering constants are E1, E2, E3, nu12, nu13, nu23, G12, G13 and, on
 the next line, G23, where nu_ij is the strain along j under stress along i; TYPE=ANISOTROPIC takes the 21 entries
 D_ijkl of `ABAQUS_ENTRIES`, eight to a line.  Numbers have up to 20 characters (Input syntax rules).
 
 CalculiX CrunchiX user's manual, *ELASTIC and *EXPANSION; fields of 20 characters are read.  Its alpha12, alpha13,
-alpha23 are the tensor's shears, half of the engineering ones.
+alpha23 are the tensor's shears, half the engineering shears.
 
 ANSYS Material Reference, linear elasticity: PRXY, PRYZ, PRXZ are the major Poisson's ratios, PRXY = -eps_y/eps_x under
 stress along x; TB,ANEL takes the lower triangle of the stiffness (TBOPT = 0) by columns, in the order [x, y, z, xy, yz,
 xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; shears have none.
 
-MOOSE: ComputeElasticityTensor takes C_ijkl: of `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
-of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
-components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
+MOOSE: ComputeElasticityTensor takes C_ijkl: for `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
+for `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
+components 11, 22, 33, 23, 13, 12 of a tensor, with half the engineering shears.
 """
 
 from collections.abc import Callable, Iterable
@@ -50,7 +50,7 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 def abaqus(material: effective_material.EffectiveMaterial) -> str:
     """Return the Abaqus card.  Raises CaseError for an expansion with shears."""
-    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
+    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering shear.
     _refuse_shears(material, "which cards for Abaqus do not carry")
     return _keyword_card(material, "ANISOTROPIC")
 
@@ -159,7 +159,7 @@ def _quoted(values: Iterable[float]) -> str:
 def csv_table(material: effective_material.EffectiveMaterial) -> str:
     """Write the material as a table in CSV format.
 
-    Rows: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
+    The rows are engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12].
     """
     rows, unit, C = list[tuple[str, float, str, str]](), material.stress_unit, material.stiffness
     for name, value in material.constants.items():
@@ -189,7 +189,7 @@ SYMMETRIES: dict[str, Callable[[Document], effective_material.EffectiveMaterial]
 
 
 def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str:
-    """Return the card for a result with a stiffness or a conductivity.  Raises like `SYMMETRIES` and `FORMATS`."""
+    """Return the card of a stiffness or conductivity.  Raises like the functions in `SYMMETRIES` and `FORMATS`."""
     if document.get("effective_conductivity") is not None:
         return effective_material.conductor_card(document, form, symmetry)
     return FORMATS[form](SYMMETRIES[symmetry](document))

@@ -1,4 +1,4 @@
-"""Pictures, drawn from the files of a result folder.
+"""Draw pictures from the files of a result folder.
 
 Imports `case`, `materials`, `report.text` and `results`. Loads Matplotlib.  Main entry: `figures.plot`.
 """

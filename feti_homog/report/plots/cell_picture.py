@@ -1,4 +1,4 @@
-"""Pictures of the cell: cell.png, partition.png, mesh_error.png, and the deformed cell under each load.
+"""Draw the cell: cell.png, partition.png, mesh_error.png, and the deformed cell under each load.
 
 Fibres have the numbers N of `fibre = N` in case files.
 """
@@ -30,13 +30,13 @@ LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
 CUT = "#B00000"  # colour of cuts within bodies
-FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours do not tell values
+FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours show nothing
 
 
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the materials of the cell with the fibre numbers.
 
-    The figure also has the strength factors of the fibres if these factors differ.
+    The figure also has the strength factors of the fibres if the factors differ.
     """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
@@ -61,14 +61,14 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
 
 
 def _cyclic_colours(count: int) -> Array:
-    """Return colours (count, 4) around the colour circle, which begins with blue and has no grey."""
+    """Return colours (count, 4) around the colour circle, from blue on; none of them is grey."""
     return np.asarray(mpl.colormaps["hsv"]((0.58 + TURN * np.arange(count)) % 1.0))
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
 
-    A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
+    A subdomain across materials counts once for each body.  Beyond `IN_LEGEND` colours, they are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
@@ -100,7 +100,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the cell coloured by its mesh error density; return None without error estimates.
 
-    Density: fraction of the strain energy error / fraction of the area, the largest over all states.  Singular tips
+    The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips
     lie above the colour range: otherwise the rest of the cell would have one colour.
     """
     file, drawn = cell.file, cell.drawn
@@ -134,7 +134,7 @@ def _outlined(cell: drawn_cell.DrawnCell, colours: Array, look: plot_helpers.Loo
     """Draw the cell with triangle colours (q, 4) and body outlines."""
     picture, axes = drawn_cell.figure_of(cell.file.attrs, look)
     points, triangles = cell.drawn.points, cell.drawn.triangles
-    # Each triangle has nodes of its own; without antialiasing, which would leave seams.
+    # Each triangle has its own nodes, for sharp colours; antialiasing would leave seams.
     separate = np.arange(triangles.size).reshape(-1, 3)
     mesh: Any = plot_helpers.add_triangles(axes, points[triangles].reshape(-1, 2), separate)
     mesh.set_facecolor(np.repeat(colours, 3, axis=0))
@@ -192,9 +192,9 @@ def deformed(
 ) -> Figure:
     """Draw the deformed cell in a state, coloured by a stress component.
 
-    The figure also has the states of the interface.  Displacements in the plane are magnified, beside the undeformed
+    The figure also shows the states of the interface.  Displacements in the plane are magnified, over the undeformed
     outline.  A shear along the fibres moves nothing in the plane: contour lines of the axial displacement u_3 show the
-    shear.  A conduction has isotherms, with minus the flux.
+    shear.  For conduction, the figure shows isotherms and minus the flux.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
     displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)

@@ -1,4 +1,4 @@
-"""The mesh in result.h5, coarsened for pictures, with its fields.
+"""Read the mesh of result.h5, coarsened for pictures, and its fields.
 
 The coarse mesh has at most TRIANGLE_LIMIT triangles where the nesting allows; the file is read in blocks.
 """
@@ -155,7 +155,7 @@ def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
     """Return the largest displacement factor s at which no drawn triangle turns over.
 
     For all s' up to s, det(I + s' grad u) = 1 + s' tr(grad u) + s'^2 det(grad u) >= LEAST_AREA in every drawn triangle.
-    The result is infinity without a limit.
+    The result is infinite if every factor is possible.
     """
     sides, moves = _sides(drawn.points, drawn), _sides(displacement, drawn)
     area = _determinant(sides)

@@ -1,4 +1,4 @@
-"""Pictures of the deformed cell along an angle or a path: panels side by side and an animation, in one colour range."""
+"""Draw the deformed cell at several angles or along a path: panels and an animation, in one colour range."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
 OWN_COLOURS = "end, own colours"
-MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
+MAX_FRAMES, FRAME_TIME = 24, 250  # frames of the animation; milliseconds per frame
 PANEL_LIMIT = 30_000  # triangles in a panel
 WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # inches: all panels, an animated cell, the highest cell
 
@@ -45,7 +45,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Choose one stress component and one colour range for all given states.
 
-        The case may name the component; otherwise the component suits all states, or a path its peak.
+        The case may name the component; by default all states determine the component, on a path the peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
@@ -56,7 +56,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
         colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
         if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
-            # At the end, once all fibres have come off, stresses may be many times those before.
+            # At the end, after all fibres have debonded, stresses may be many times larger than before.
             before, end = (plot_helpers.colour_range(part, areas) for part in (stress[:-1], stress[-1]))
             if np.abs(end[0].inverse([0.0, 1.0])).max() > 2.0 * np.abs(before[0].inverse([0.0, 1.0])).max():
                 colours, mark_of = before, mark_of | {max(mark_of): OWN_COLOURS}
@@ -99,7 +99,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; two bars have titles."""
+        """Draw the colour bar of the shapes beside the axes; if there are two bars, both have titles."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")

@@ -1,4 +1,4 @@
-"""The cell in pictures: triangles, frame with a colour bar, interface, and load labels."""
+"""Draw the parts of cell pictures: triangles, frame with a colour bar, interface, load labels."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class InterfaceEdges:
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
         """Find the interface edges among the body outlines.
 
-        All periodic images of an interface node have one row in /interface.
+        All periodic images of an interface node share one row in /interface.
         """
         points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
         if not len(points):
@@ -70,7 +70,7 @@ class InterfaceEdges:
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
         """Draw the interface edges in a state, with nodes at `points` (p, 2); return legend lines for the drawn states.
 
-        Damaged edges that hold have colours by the damage of their ends, in tenths.
+        Damaged edges that hold are coloured by the damage at their ends, in tenths.
         """
         states = self.state(states_of_nodes(state))
         damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0) if "damage" in state else np.zeros(len(states))
@@ -79,7 +79,7 @@ class InterfaceEdges:
             segments = points[self.edges[states == kind]]
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
             if kind != BONDED:
-                # This ink shows on every colour; magenta and orange vanish on red.
+                # A white edge shows on every colour; magenta and orange vanish on red.
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
             tenths = np.ceil(10.0 * damage[states == kind]) if kind == DAMAGED else np.ones(len(segments))
             for tenth in np.unique(tenths):
@@ -113,12 +113,12 @@ def states_of_nodes(state: Any) -> Array:
 
 
 def damage_colour(damage: float) -> Any:
-    """Return the colour of a damage between 0 and 1."""
+    """Return the colour for a damage value between 0 and 1."""
     return mpl.colormaps["BuPu"](0.35 + 0.65 * damage)
 
 
 def state_legend(kinds: Collection[NodeState]) -> list[Line2D]:
-    """Return legend lines of interface states, with three steps of the colours of damage."""
+    """Return legend lines of interface states, with lines for three damage values."""
     lines = [(STATE_NAMES[k], STATE_COLOURS[k], STATE_WIDTHS[k]) for k in kinds if k != DAMAGED]
     if DAMAGED in kinds:
         lines += [(f"damage {d:g}", damage_colour(d), STATE_WIDTHS[DAMAGED]) for d in (0.1, 0.5, 1.0)]
@@ -150,7 +150,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
-    """Add a colour bar for `shapes` at the right of the axes; return the bar.
+    """Add a colour bar for `shapes` to the right of the axes; return the bar.
 
     The bar is 1/25 of the longer side of the cell wide, as high as the cell, and at least 1/4 of the longer side high.
     """
@@ -163,7 +163,7 @@ def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
 
 @dataclass(frozen=True)
 class LoadLabels:
-    """The load labels for the result states.
+    """The labels of loads for the states of a result.
 
     Attributes:
         leading: component of the leading strain of a path; None for other analyses.

@@ -1,4 +1,4 @@
-"""All pictures of a result folder; each module of this package is loaded only for results with its pictures."""
+"""Draw all pictures of a result folder; load each module of this package only for results with its pictures."""
 
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,9 @@ def plot(
     - `load`: load.png; `envelope`: envelope.png;
     - interface.png, of a path or a debonded interface: tractions, jumps and damage around fibres.
 
-    [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
-    A case without fields has only curves.  A `component` replaces the stress; a `state`, by number or label, gives
-    only state_K.png.  Call on one rank.
+    [output] of the case in result.json sets the stress component (default: from the unit strain) and the deformation
+    scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by number
+    or label, only state_K.png is drawn.  Call on one rank.
 
     Raises:
         CaseError: the result has no such state or component.

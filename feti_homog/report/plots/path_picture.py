@@ -1,4 +1,4 @@
-"""path.png and energy.png: stresses, interface states and energies along a path."""
+"""Draw path.png and energy.png: stresses, interface states and energies along a path."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,7 +33,7 @@ AREAS = {
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw stresses and interface states against the leading strain, with the landmarks.
 
-    A panel between the two shows a temperature that changes.  Selected points have their numbers.
+    A panel between the two shows the change of temperature, if any.  Selected points carry their numbers.
     """
     points, case = document["path"], document["case"]
     component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
@@ -169,9 +169,9 @@ def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
 def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the energies per area as a stack over the leading strain or the path position.
 
-    The position counts earlier legs and the load fraction on the leg.  On a proportional path the load rises;
-    where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy.
-    Returns None for results without energies.
+    The position is the number of earlier legs plus the load fraction on the leg. On a proportional path the load rises;
+    where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy.  Returns
+    None for results without energies.
     """
     points = document.get("path") or [{}]
     if "work" not in points[0]:

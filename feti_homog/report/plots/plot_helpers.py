@@ -1,4 +1,4 @@
-"""Helpers of all pictures: style, triangles and lines, colour ranges, labels."""
+"""Provide helpers for all pictures: style, triangles and lines, colour ranges, labels."""
 
 import math
 import warnings
@@ -116,7 +116,7 @@ def finish_curves(*panels: Axes) -> None:
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
-    """Add a legend below the axes, in as many columns as the figure is wide, at most `limit`."""
+    """Add a legend below the axes, in as many columns as fit into the figure, at most `limit`."""
     for columns in range(min(len(handles), limit), 0, -1):
         legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
@@ -164,9 +164,9 @@ def draw_segments(
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
     """Choose the colour range and the colour map of a stress.
 
-    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or has zero in the
-    middle if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1
-    by default: meshes are fine at tips, where stresses are singular.
+    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
+    zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
+    default: meshes are fine at tips, where stresses are singular.
 
     Returns:
         colour range, colour map, and the ends of the range beyond which values lie.
@@ -294,5 +294,5 @@ def stress_unit(case: Document) -> str:
 
 
 def title_of(case: Document, phrase: str) -> str:
-    """Return a title of the case name, if any, and `phrase`."""
+    """Join the case name, if any, and `phrase` to a title."""
     return f"{plain(case.get('name', ''))}: {phrase}".lstrip(": ")

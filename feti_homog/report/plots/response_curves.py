@@ -1,4 +1,4 @@
-"""Pictures from numbers in result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
+"""Draw numbers of result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
 
 from collections.abc import Sequence
 from pathlib import Path

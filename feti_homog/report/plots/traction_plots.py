@@ -1,4 +1,4 @@
-"""interface.png: tractions and jumps around the fibres."""
+"""Draw interface.png: tractions, jumps and damage around the fibres."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NAMES = {
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw tractions, jumps and damage around the most debonded or damaged, else most loaded fibres, one per row."""
+    """Draw tractions, jumps and damage, one fibre per row: the most debonded or damaged, else the most loaded."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED
@@ -88,7 +88,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
 
 
 def _limit(axes: Axes, values: Array) -> None:
-    """End the ordinate where a few nodes at singular tips exceed all other values (n,)."""
+    """Limit the ordinate if a few nodes at singular tips exceed all other values (n,)."""
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
     low, high = 2.0 * low - high, 2.0 * high - low
     if high > low and (values.min() < low or values.max() > high):
@@ -98,7 +98,7 @@ def _limit(axes: Axes, values: Array) -> None:
 def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw.
 
-    A path has its peak, and the valley after the peak or a late state; another analysis has one state.
+    For a path, these are the peak, and the valley after it or a late state; for other analyses, one state.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
@@ -130,7 +130,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
             values = np.column_stack([values, axial])
         values = values.reshape(len(values), -1)
         values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
-        # The curve closes if the gap between the last and the first node is less than twice the other gaps.
+        # The curve closes if the gap between the last and the first node is less than twice the largest other gap.
         if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
             at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])
             values = np.concatenate([values[-1:], values, values[:1]])
@@ -183,7 +183,7 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     offset, length = _shortest(nodes[:, None] - starts[nearest] - 0.5 * step, period), np.linalg.norm(step, axis=2)
     fraction = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
     distance = np.linalg.norm(offset - (fraction - 0.5)[..., None] * step, axis=2)
-    # A vertex is the start of an edge, not an end.
+    # A vertex counts as the start of an edge, not as an end.
     best = np.arange(len(nodes)), (distance + SAME_PLACE * length * fraction).argmin(axis=1)
     at = before[nearest[best]] + (fraction * length)[best]
     order, unit = np.argsort(at, kind="stable"), plot_helpers.unit_label(file.attrs["length_unit"])
@@ -192,7 +192,7 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Chain edges (e, 2) to boundaries, as counterclockwise node lists.
+    """Chain edges (e, 2) into boundaries, as counterclockwise node lists.
 
     A closed boundary repeats its first node, whose normal is nearest to x1; an open one begins at an end.
     """

@@ -1,4 +1,4 @@
-"""Tables of stiffness, thermal constants, moduli and engineering constants, bounds, estimates and derivatives.
+"""Build tables of stiffness, thermal constants, moduli, engineering constants, bounds, estimates and derivatives.
 
 Material axes 1, 2, 3, as in data sheets and cards, are the cell axes x3 (the fibres), x1, x2.
 """
@@ -36,7 +36,7 @@ MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return tables of L^ef, also under minus the unit strains.  All entries have the decimals of the largest entry."""
+    """Return tables of L^ef, also under minus the unit strains.  All entries have as many decimals as the largest."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -49,7 +49,7 @@ def stiffnesses(document: Document) -> list[Table]:
 
 
 def conductivity(document: Document) -> list[Table]:
-    """Return tables of k^ef and its mesh errors, with closed forms and bounds for the directions across."""
+    """Return tables of k^ef and its mesh errors, with closed forms and bounds across the fibres."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
     title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
     matrices = (title, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
@@ -63,7 +63,7 @@ def conductivity(document: Document) -> list[Table]:
         for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
             lower, upper = forms.get(key) or (None, None)
             rows += [[f"{name} {label}", lower, k[i][i], upper, UNKNOWN] for i, name in enumerate(names[:2]) if lower]
-        if forms.get("maxwell") and not forms.get("hashin_shtrikman"):  # of bonded fibres one of these bounds
+        if forms.get("maxwell") and not forms.get("hashin_shtrikman"):  # for bonded fibres, one of these bounds
             rows.append(["across: Maxwell", UNKNOWN, (k[0][0] + k[1][1]) / 2, UNKNOWN, forms["maxwell"]])
         columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper", "estimate"))]
         tables.append(Table("Bounds and estimates", columns, rows, title_in_head=True))
@@ -150,7 +150,7 @@ def bounds(document: Document) -> Table:
 def cell_constants(document: Document) -> list[Table]:
     """Return tables of the engineering constants in space.
 
-    Constants about the fibre axis have estimates and bounds.
+    Constants about the fibre axis appear with estimates and bounds.
     """
     tables, values = list[Table](), document.get("constants")
     errors, label = _errors(document).get("constants", {}), stress_label(document)
@@ -184,7 +184,7 @@ def cell_constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the cells for which estimates exist, unlike for this cell."""
+    """Name the kind of cells that have estimates, which this cell lacks."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"
@@ -265,5 +265,5 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Return the constants that tables show; the first MOST for a load or secants in space."""
+    """Return the constants that tables show; for a load, or for secants in space, the first MOST."""
     return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else list(names[:MOST])

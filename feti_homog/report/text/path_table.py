@@ -1,4 +1,4 @@
-"""The table of a path: peak, energies, and rows of some points."""
+"""Build the table of a path: peak, energies, and rows for selected points."""
 
 from textwrap import wrap
 
@@ -17,7 +17,7 @@ ROWS = 15  # of the table
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
 
-    Columns: leading and prescribed strains, named and acting stresses, temperature, strains of prescribed stresses.
+    Columns: leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
@@ -98,8 +98,8 @@ def _place(peak: Document, title: str, noun: str) -> str:
 def _path_energies(document: Document, label: str) -> list[str]:
     """Describe the energies along a path.
 
-    Work of the loads, energy stored at the end, energy lost by breaks along all equilibria and under a rising load,
-    and the debonded fraction.
+    The lines give the work of the loads, the energy stored at the end, the energy lost by breaks along all equilibria
+    and under a rising load, and the debonded fraction.
     """
     points, legs = document["path"], path_curves.legs(document)
     last = points[-1]

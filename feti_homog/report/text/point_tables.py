@@ -1,4 +1,4 @@
-"""Tables of an angle, a load or an envelope, and of energy release rates at tips."""
+"""Build the tables of an angle, a load or an envelope, and of energy release rates at tips."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -139,14 +139,14 @@ def components(point: Point) -> tuple[float, float]:
 
 
 def tip_table(document: Document, tips: Document) -> Table:
-    """Return the table with the largest-G tip for each load."""
+    """Return the table of the tip with the largest G for each load."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
     return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return tables of the largest G for each angle and load; a single load has all numbers of the tip."""
+    """Return tables of the largest G for each angle and load; for a single load, with all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

@@ -1,4 +1,4 @@
-"""Text of studies: tables of a fit from fit.json, and of scatter from uncertainty.json."""
+"""Write the tables of studies as text: a fit from fit.json, scatter from uncertainty.json."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document, axes: str = "") -> str:
-    """Return the fit tables: unknowns, correlations, measured values; `axes` explains misread names."""
+    """Return the fit tables: unknowns, correlations, measured values; `axes` is a remark on names that mislead."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]

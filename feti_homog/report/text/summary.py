@@ -1,6 +1,6 @@
-"""The printed summary of a result.json, tables for notebooks, and the registry of reported analyses.
+"""Write the summary of a result.json and tables for notebooks; register the reported analyses.
 
-Modules of pictures find an analysis by its name: `response_curves.CURVES`.
+Picture modules find an analysis by name, such as in `response_curves.CURVES`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,12 +25,12 @@ STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "
 
 @dataclass(frozen=True)
 class ReportedAnalysis:
-    """An analysis for the reports; its entry in result.json has its name, except for the stiffness.
+    """An analysis in reports; its entry in result.json has the same name, except for the stiffness.
 
     Attributes:
         title: the name in words.
         is_curve: whether the states are points of a curve, shown side by side.
-        is_followed: whether first and last states matter most.
+        is_followed: whether the states follow a load path, so that landmarks choose among them.
         picture: name of the picture of a state; "": the picture has the name of the unit load.
     """
 
@@ -60,8 +60,8 @@ def reported(document: Document) -> ReportedAnalysis:
 def summary(document: Document) -> str:
     """Return the printed summary of a result.
 
-    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.  Lines have up
-    to 79 characters, tables up to 100, except for long names.
+    The summary has cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
+    Lines have up to 79 characters, tables up to 100, except for long names.
 
     Raises:
         KeyError: the document lacks a required key.
@@ -139,7 +139,7 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 
 
 def title_of(document: Document) -> str:
-    """Return a title of case name, analysis and plane state."""
+    """Return a title with case name, analysis and plane state."""
     case = document["case"]
     plane = "" if reported(document) == CONDUCTIVITY else f", plane {case['analysis']['plane']}"
     return f"{case.get('name', '')}: {reported(document).title}{plane}".lstrip(": ")
@@ -229,7 +229,7 @@ def phase_tables(document: Document) -> list[Table]:
     tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
     acting = [name for name, value in load.items() if value]
-    # stresses in proportion to the load
+    # Load factors need stresses in proportion to the load.
     has_factors = "path" not in document and not ("temperature" in acting and len(acting) > 1)
     stresses = [name for name in acting if has_factors and acting == [name] and name.startswith("S")]
     used = list[list[Any]]()

@@ -1,4 +1,4 @@
-"""Tables of a result as text for a terminal and as HTML, and the units of table columns."""
+"""Write the tables of a result as text for a terminal or as HTML, and find the units of table columns."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -90,7 +90,7 @@ class Table:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text, the title replaces the head of the first column.
         abreast: rows per line of text, without heads; 0 for one row per line with heads.
-        most_columns: most columns after the first; further columns form blocks below, without unknown rows.
+        most_columns: largest number of columns after the first; others form blocks below, without unknown rows.
     """
 
     title: str
