@@ -266,7 +266,8 @@ class EventLog:
         try:
             with atomic.file_errors("write", self.path):
                 if self._stream is None:
-                    self.path.unlink(missing_ok=True)  # a pipe without a reader would wait for ever
+                    if self.path.is_fifo():  # it would wait for a reader
+                        self.path.unlink()
                     self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
                     print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)
                 print(line.strip(), file=self._stream)

@@ -142,9 +142,9 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
     """Compute outward normals (n, 2, 2) at both ends of edges, and turns (n,), as in `SharedEntities`.
 
-    `triangle` (n,) are triangles, `k` (n,) the positions 0 to 2 of the edges.
+    `triangle` (n,) are triangles or pixels, `k` (n,) the positions of the edges.
     """
-    a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
+    a, b = (mesh.points[mesh.triangles[triangle, (k + step) % mesh.triangles.shape[1]]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
     turn = mesh.turns[plane]
     tangents = np.repeat((b - a)[:, None], 2, axis=1)
