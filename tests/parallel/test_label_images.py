@@ -17,8 +17,8 @@ from feti_homog.verify.certificate import verify
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 # In pieces, of which several ranks have interface nodes.
-SPRUNG = {"interface": SPRINGS, "decomposition": {"subdomains": 40}}
-LEAKY = {"interface": {"conductance": 3.0, "debonded": []}, "decomposition": {"subdomains": 40}}
+SPRUNG = {"interface": SPRINGS, "decomposition": {"subdomains": 50}}
+LEAKY = {"interface": {"conductance": 3.0, "debonded": []}, "decomposition": {"subdomains": 50}}
 CONDUCTORS = {"matrix": {"conductivity": 0.2}, "fibre": {"conductivity": 1.1}}
 
 
