@@ -60,8 +60,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
     """List pixels that voids cut off from others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
-    part, faults = components(len(solid), *Torus.of(mesh).sides[:2]), []
-    sizes = np.bincount(part)
+    faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:
         row, column = rows - solid[k] // columns, solid[k] % columns + 1
         where = f"that of {sizes[part[k]]} pixels with the one in row {row}, column {column}"

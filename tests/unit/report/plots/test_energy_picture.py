@@ -72,8 +72,8 @@ def test_energies_at_rising_loads_and_results_without_energies() -> None:
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
     assert {1.0, 2.0} <= {*place} and (np.diff(place) >= 0.0).all()
-    # One leg: the load 0.5 is reached on a branch that stores 2 at the load 1, a quarter of it at 0.5; 3.5 are lost, and
-    # 2.5 are heat.
+    # One leg: the load 0.5 is reached on a branch that stores 2 at the load 1, a quarter of it at 0.5; 3.5 are lost,
+    # and 2.5 are heat.
     document = path([0.5, 0.25, 1.0], **ENERGIES | {"stored": [4.0, 1.0, 2.0], "stored_in_springs": [0.0] * 3})
     document["case"]["path"]["waypoints"].pop()
     for point, lost in zip(document["path"], (0.0, 3.0, 3.5), strict=True):
