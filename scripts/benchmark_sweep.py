@@ -1,4 +1,4 @@
-"""Compare the times of sweeps and of a CHOLMOD loop on the same meshes.
+"""Time two sweeps and a loop of CHOLMOD solves on the same meshes.
 
 One sweep runs on one rank, one has a case on each rank. All three are whole commands, start-up included, run in turns.
 The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor

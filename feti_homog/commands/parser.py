@@ -170,7 +170,7 @@ def _command(
 
 
 def integer(word: str) -> int:
-    """Convert a word of one to nine digits, with or without a sign, to an integer.  Raises ValueError."""
+    """Convert text to an integer of at most nine digits.  Raises ValueError."""
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)

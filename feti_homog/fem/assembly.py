@@ -1,4 +1,4 @@
-"""Assemble the stiffness, unit strain loads, averages and integrals along voids of one subdomain.
+"""Assemble the stiffness of a subdomain, its loads by unit strains, averages, and integrals along voids.
 
 Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
 summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.

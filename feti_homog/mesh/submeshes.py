@@ -174,15 +174,13 @@ def part(submesh: Submesh, members: Int) -> Submesh:
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
     torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
-    number = np.zeros(len(submesh.points), np.int64)
-    number[vertices] = np.arange(len(vertices))
     rows = zip((members, vertices, edges, classes, torus_edges), ROWS, strict=True)
     return replace(
         submesh,
         **{name: getattr(submesh, name)[some] for some, names in rows for name in names},
         triangles=triangles,
         triangle_edges=triangle_edges,
-        edges=number[submesh.edges[edges]],
+        edges=np.searchsorted(vertices, submesh.edges[edges]),
         vertex_class=vertex_class,
         edge_class=edge_class,
         pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),

@@ -127,13 +127,14 @@ def _require_mesh(path: Path, file: Any) -> None:
         (x1, y1), (x2, y2) = (np.transpose(points[block[:, k]] - points[block[:, 0]]) for k in (1, 2))
         flat += int(np.count_nonzero(x1 * y2 - x2 * y1 <= 1e-20 * span.prod()))
     gap = np.stack([file["interface/points"] - points[file[f"interface/{face}_node"]] for face in ("fibre", "matrix")])
-    phases, labels = file.attrs["phases"], [state.attrs["label"] for state in file.get("state", {}).values()]
+    phases = file.attrs["phases"]
+    names = [*phases, *(state.attrs["label"] for state in file.get("state", {}).values())]
     for holds, fault in (
         (not flat, f"{flat} elements have no area"),
         (np.isin(file["fibre/body"], file["mesh/body"]).all(), "a fibre has no elements"),
         ((np.abs(gap - size * np.round(gap / size)) <= 1e-5 * size.max()).all(), "interface nodes are not in the mesh"),
         (all({phase, phase.partition(":")[0]} & {*case["material"]} for phase in phases), "its case has other phases"),
-        (all(text.isprintable() and "$" not in text for text in (*phases, *labels)), "a name is not printable"),
+        (all(map(str.isprintable, names)) and "$" not in "".join(names), "a name has $ or is not printable"),
     ):
         if not holds:
             raise CaseError(f"cannot read {path}: {fault}")

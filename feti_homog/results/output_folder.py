@@ -266,7 +266,7 @@ class EventLog:
         try:
             with atomic.file_errors("write", self.path):
                 if self._stream is None:
-                    if self.path.is_fifo():  # it would wait for a reader
+                    if self.path.is_fifo():  # opening a pipe would wait for a reader
                         self.path.unlink()
                     self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
                     print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)

@@ -1,4 +1,4 @@
-"""Run a command, and wait until no process that it started is left; whatever is left after LEFT_S becomes a line.
+"""Run a command and wait for all its processes; print a line for each process left after LEFT_S.
 
 Processes whose parents end become children of this one, whatever their session or process group.  No package is
 imported: this program starts with each attempt.
@@ -20,7 +20,7 @@ def adopt() -> None:
 
 
 def report() -> None:
-    """Print and kill what is left: it may keep the output of the command open."""
+    """Print and kill the processes left, which may hold the output of the command open."""
     for child in children():
         print(f"left: process {child}", file=sys.stderr, flush=True)
         os.kill(child, signal.SIGKILL)

@@ -29,7 +29,7 @@ RUNS = (
 )  # fmt: skip
 ENDS, STARTS = ("", "!"), ("", '"')
 # Characters, with the number of texts that were the slowest at the length before; None for all.
-LENGTHS = {1000: None, 20_000: 40, 100_000: 4, 1_000_000: 1}
+LENGTHS = {1000: None, 20_000: 40, 100_000: 8, 1_000_000: 3}
 ALLOWED, SHORTEST = 50, 0.01  # times of a linear pattern, and least seconds of one
 
 

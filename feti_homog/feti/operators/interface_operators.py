@@ -242,7 +242,7 @@ class InterfaceOperators:
         return one_subdomain.CondensedLoads(boundary, stiffness, energy)
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
-        """Extend boundary displacements x (n_s, k) to all dofs of one subdomain: (dofs, k).
+        """Extend boundary displacements x (n_s, k) of a subdomain to all its dofs (dofs, k).
 
         Args:
             place: position of the subdomain.

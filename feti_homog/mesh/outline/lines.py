@@ -56,7 +56,7 @@ class Curves:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
-        """Concatenate the points (n, 2) and the curves of all parts, each of which numbers its points from 0."""
+        """Join the points (n, 2) and curves of all parts, and number the points through all parts."""
         begin = np.cumsum([0, *(len(points) for points, _ in parts)])
         counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
         curves = cls(

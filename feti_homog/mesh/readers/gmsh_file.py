@@ -186,7 +186,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: nodes or elements share a number, or an element type is not in LINES or TRIANGLES.
+        MeshError: nodes or elements share a number, a node is missing, or an element type is not in LINES or TRIANGLES.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])
@@ -194,6 +194,8 @@ def raw_mesh(content: MshContent) -> RawMesh:
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(twice):
             faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
+    if not all(np.isin(nodes, content.tags).all() for _, nodes, _ in elements.values()):
+        faults.append("the file is damaged: gmsh crashes on it, or reads elements without their nodes")
     kinds = elements.keys() - {"Point", *LINES}
     if not faults and not kinds:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")

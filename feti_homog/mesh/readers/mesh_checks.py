@@ -1,4 +1,4 @@
-"""Check the meshes of users: each function lists the faults of one kind, with the first nodes or elements."""
+"""Check users' meshes: each function lists faults of one kind and names the first nodes or elements."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -111,10 +111,11 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     _refuse(path, mesh_checks.islands(raw, torus), mesh_checks.void_faults(raw, torus, has_voids))
     _refuse(path, mesh_checks.cannot_debond(raw, torus))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
-    mesh = with_circles(mesh, middles)
+    pairs = torus.low_copies(torus.is_outline)
+    mesh = with_circles(mesh, pairs, middles)
     # Number the fibres before edges bend, so that round fibres come first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
-    return replace(with_bent_edges(with_ellipses(mesh, middles), middles), precedence=numbers)
+    return replace(with_bent_edges(with_ellipses(mesh, pairs, middles), pairs, middles), precedence=numbers)
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:

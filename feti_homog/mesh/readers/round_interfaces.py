@@ -1,4 +1,4 @@
-"""Fit curves to interfaces in users' meshes: closed circles and ellipses, and arcs through middle nodes."""
+"""Fit circles, ellipses and arcs through middle nodes to the interface edges `pairs` (k, 2) of users' meshes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
-from feti_homog.mesh.periodic_topology import Torus, components
+from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float, Int, Int32
@@ -28,15 +28,13 @@ MOST_BENT = 1 - np.sqrt(3) / 2
 STRAIGHT = 1e-5
 
 
-def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
+def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Replace round interfaces by circles, and move interface nodes exactly onto the circles.
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
     corner. Middle nodes cut edges in two. Other interfaces stay polygons.
     """
-    torus = Torus.of(mesh)
-    pairs = torus.low_copies(torus.is_outline)
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
         # The circle |d|^2 = 2 c.d + r^2 - |c|^2 that fits best, with offsets d from the mean.
@@ -71,7 +69,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     )
 
 
-def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
+def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Replace elliptic interfaces that are not circles by ellipses.
 
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
@@ -79,8 +77,7 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
     interfaces do not change. In triangles with two edges on one ellipse, an edge flips.
     """
-    torus, nodes = Torus.of(mesh), len(mesh.points)
-    pairs = torus.low_copies(torus.is_outline)
+    nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     ellipses, arcs = list[Ellipses](), list[Int32]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
@@ -98,14 +95,13 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     return replace(added, triangles=flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes))
 
 
-def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
+def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
     Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
     chord. In a triangle with two edges on one curve, one flips: the curve has no corner there.
     """
-    torus, nodes = Torus.of(mesh), len(mesh.points)
-    pairs = torus.low_copies(torus.is_outline)
+    nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     start, stop, middle = mesh.points[pairs[:, 0]], mesh.points[pairs[:, 1]], middles.between(pairs)
     chord, offset = stop - start, middle - (start + stop) / 2

@@ -25,9 +25,10 @@ STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "
 
 @dataclass(frozen=True)
 class ReportedAnalysis:
-    """An analysis in reports; its entry in result.json has the same name, except for the stiffness.
+    """The title and states of an analysis in reports.
 
     Attributes:
+        name: type of the analysis, and of its entry in result.json except for the stiffness.
         title: the name in words.
         is_curve: whether the states are points of a curve, shown side by side.
         is_followed: whether the states follow a load path, so that landmarks choose among them.

@@ -150,8 +150,8 @@ EDITS = {
         lambda file: file.create_dataset("x", 3, external=[("y", 0, 24)]),
     ),
     "a table without data": ("/x is not a table", lambda file: file.create_dataset("x", 10**7, chunks=99)),
-    "a formula": ("a name is not printable", lambda file: file["state/0"].attrs.create("label", r"$\frac")),
-    "two lines": ("a name is not printable", lambda file: file["state/0"].attrs.create("label", "a\nb")),
+    "a formula": ("a name has . or is not printable", lambda file: file["state/0"].attrs.create("label", r"$\frac")),
+    "two lines": ("a name has . or is not printable", lambda file: file["state/0"].attrs.create("label", "a\nb")),
     "other phases": ("other phases", lambda file: file.attrs.create("phases", ["matrix", "steel"], (2,), TEXT)),
 }
 

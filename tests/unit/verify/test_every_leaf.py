@@ -86,7 +86,7 @@ def changed(document, place, value):
 
 
 def checked(findings, cell, numbers, states):
-    """Check in parts all laws that read result.json, those of fields last."""
+    """Yield after each group of laws on result.json; laws on fields come last."""
     yield laws_of_numbers(findings, cell, numbers)
     yield check_mesh(findings, cell), check_interface(findings, cell)
     for number, state in enumerate(states):

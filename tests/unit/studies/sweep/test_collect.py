@@ -97,7 +97,7 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
 
 
 def test_each_case_is_listed_by_its_status_and_done_ones_alone_count(tmp_path, monkeypatch):
-    """Numbers of a running path are in its row; those of a refused or damaged result are nowhere."""
+    """A running path has numbers in its row; a refused or damaged result has none in any table."""
     states = {status: (f"because {status}", path_document(2, 0.0)) for status in case_folders.Status}
     entries = [case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k, _ in enumerate(states, start=1)]
     index = case_folders.SweepIndex("test", "GPa", tuple(entries))
@@ -242,7 +242,7 @@ def test_angles_in_space_have_all_entries():
 
 
 def test_what_varies_along_is_no_other_series():
-    """Nor a key of one value; points of a series are in rising order."""
+    """A key of one value makes no series, either; the points of a series rise."""
     counts = [8, 4, 4, 8]
     sizes = {"cell.mesh_size": [0.2, 0.3, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2], "cell.order": [1] * 4}
     documents = [document(0.4, fibres, 0.0) for fibres in counts]
