@@ -277,8 +277,8 @@ def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping
     states = [before, *(_bond_state(event, suffix) for suffix in (*SUFFIXES[: len(context.loads.problems)], "_after"))]
     holds = min(event["path"][4:].min(), event["numbers"].min()) >= 0 and np.isnan(event["bond"]).sum() != 1
     for name, array in event.items():
-        if array.dtype.char == "d":
-            holds &= bool(np.isfinite(array[~np.isnan(array)] if name.startswith(UNKNOWN) else array).all())
+        known = array[~np.isnan(array)] if name.startswith(UNKNOWN) else array
+        holds &= array.dtype.char != "d" or bool(np.isfinite(np.vdot(known, known)))
     for earlier, later in pairwise(states):
         heals = (later.history < earlier.history).any(axis=1) | (later.status == BONDED) & (earlier.status != BONDED)
         is_known = np.isin(later.status, [*Contact]) & np.isin(later.sliding_signs, [-1, 0, 1])

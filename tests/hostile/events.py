@@ -72,6 +72,7 @@ FALSE: dict[str, Callable[[Path], None]] = {
     "an unknown status": with_array("status", last_is(7)),
     "healed bonds": with_array("status_after", lambda status: 0 * status),
     "endless energies": with_array("energies", last_is(np.inf)),
+    "jumps whose squares overflow": with_array("jump", lambda jump: 0 * jump + 1e308, 0),
     "other energies": with_array("energies", lambda energies: 1.01 * energies, 0),
     "another load": with_array("path", lambda path: path * [1.1, 1, 1, 1, 1, 1]),
     "other means": with_array("means", lambda means: 1.001 * means, 0),
