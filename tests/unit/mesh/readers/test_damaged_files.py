@@ -22,6 +22,7 @@ from unit.mesh.readers.test_strangers_meshes import by_gmsh
 from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
+from feti_homog.mesh.readers import gmsh_file
 from feti_homog.mesh.readers.msh_reader import read
 
 MESH = grid().with_curve(RIGHT_SIDE)
@@ -172,3 +173,11 @@ if __name__ == "__main__":
     for name in SEEDS:
         folder = Path(os.environ.get("TMPDIR", "/tmp"))
         print(name, dict(_ends(name, folder, int(sys.argv[1]) // len(SEEDS), int(sys.argv[2]))), flush=True)
+
+
+def test_elements_without_their_nodes_are_refused():
+    """gmsh crashes on such a file, or reads it, by what is in memory."""
+    elements = {"Triangle 3": (np.array([7]), np.array([[1, 2, 3]]), np.array([1]))}
+    content = gmsh_file.MshContent(np.array([1, 2]), np.eye(3)[:2], elements, {(2, 1): (1,)})
+    with pytest.raises(MeshError, match=r"the file is damaged: .* elements without their nodes"):
+        gmsh_file.raw_mesh(content)

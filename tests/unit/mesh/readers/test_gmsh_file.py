@@ -250,14 +250,6 @@ def test_faults_of_the_format_are_named(name, tmp_path):
     assert caught.value.faults[0].startswith("a.msh: ") and message in caught.value.faults[0]
 
 
-def test_elements_without_their_nodes_are_refused():
-    """gmsh crashes on such a file, or reads it, by what is in memory."""
-    elements = {"Triangle 3": (np.array([7]), np.array([[1, 2, 3]]), np.array([1]))}
-    content = gmsh_file.MshContent(np.array([1, 2]), np.eye(3)[:2], elements, {(2, 1): (1,)})
-    with pytest.raises(MeshError, match=r"the file is damaged: .* elements without their nodes"):
-        gmsh_file.raw_mesh(content)
-
-
 def test_every_kind_of_unusable_elements_is_named(tmp_path):
     mesh = grid()
     nodes = list(mesh.nodes)[:5]
