@@ -42,8 +42,9 @@ class SpringSides:
         for part in parts:
             triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
             nodes, first = number[first : first + part.mesh.n_classes][line], first + part.mesh.n_classes
-            inner = np.asarray((nodes >= 0).all(axis=1))
-            inner[inner] = (fibre[nodes[inner]] == part.submesh.constituent[triangle[inner], None]).all(axis=1)
+            inner = (np.append(fibre, -1)[nodes] == part.submesh.constituent[triangle, None]).all(axis=1)
+            # A cut may join two interface nodes across a narrow fibre.
+            inner[inner] = (neighbours.near[nodes[inner, 0]] == nodes[inner, 1, None]).any(axis=1)
             normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])
             nodes = nodes[inner][:, starts[:, None] + np.arange(lattice.order + 1)].reshape(-1, lattice.order + 1)
             side = np.tile(np.arange(len(starts)), len(turn))
@@ -113,6 +114,5 @@ class SpringSides:
         """Rotate normal and tangential components to plane vectors (n, 2, k); keep axial components (n, 1, k)."""
         if components.shape[1] == 1:
             return components
-        normal = self._normal
-        tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
+        normal, tangent = self._normal, self._normal[:, ::-1] * [-1.0, 1.0]
         return np.asarray(normal[..., None] * components[:, None, 0] + tangent[..., None] * components[:, None, 1])

@@ -50,12 +50,8 @@ def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, seed, s
     result = solved(comm, path, {"pixel": 1 / 16, "boundary": boundary}, **sections)
     C, other = result.effective_stiffness, expected.effective_stiffness
     assert np.abs(C - other).max() < 1e-11 * other.max()
-    if sections:  # METIS cuts pixels and triangles into other pieces, and errors depend on cuts: compare whole bodies
-        whole = {"interface": SPRINGS}
-        expected = compute(Case.parse(RUN | {"cell": cell} | whole), MPI.COMM_SELF)
-        result = solved(MPI.COMM_SELF, path, {"pixel": 1 / 16, "boundary": boundary}, **whole)
     errors, others = result.mesh_error.effective_stiffness, expected.mesh_error.effective_stiffness
-    assert np.abs(errors - others).max() < 1e-7 * others.max()  # fits in another order of elements
+    assert np.abs(errors - others).max() < 1e-7 * others.max()  # whatever the pieces; fits in another order of elements
 
 
 def plane_strain(phase):

@@ -82,6 +82,7 @@ class InterfaceNeighbours:
         rows: (n,) first global row of the bond.
         first: number of the first node on this rank.
         adjacency: (n, n) matrix with 1 between adjacent nodes.
+        near: (n, most neighbours + 1) every node and its neighbours, padded with the node.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
@@ -111,11 +112,10 @@ class InterfaceNeighbours:
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
         self._components = jump_operator.components
-        # (n, most neighbours + 1) every node and its neighbours, padded with the node.
         count = np.diff(self.adjacency.indptr)
-        self._neighbours = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
+        self.near = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
         within = np.arange(self.adjacency.nnz) - np.repeat(self.adjacency.indptr[:-1], count)
-        self._neighbours[np.repeat(np.arange(n), count), within] = self.adjacency.indices
+        self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
         """Extend global rows (k,) by rows of adjacent nodes, until there are `enough` rows.
@@ -126,7 +126,7 @@ class InterfaceNeighbours:
         while True:
             candidates = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
             result = np.union1d(rows, choose(candidates))
-            extended = np.unique(self._neighbours[bonds])
+            extended = np.unique(self.near[bonds])
             if len(result) >= enough or len(extended) == len(bonds):
                 return result
             bonds = extended
