@@ -64,7 +64,7 @@ class ConvergenceError(FetiHomogError):
 
 
 class NotCarriedError(ConvergenceError):
-    """Stresses are prescribed that nothing in the cell carries."""
+    """Nothing in the cell carries the prescribed load."""
 
 
 class NoMemoryError(FetiHomogError):

@@ -256,7 +256,7 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return the entry `mesh_error`, the largest relative strain energy error of a secant stiffness."""
+    """Return the entry `mesh_error`: largest relative error of strain energy under any strain; {} without errors."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 

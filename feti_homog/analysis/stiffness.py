@@ -1,4 +1,4 @@
-"""`analysis.type = "stiffness"`: L^ef; with contact, secants under plus and minus the unit loads."""
+"""Run `analysis.type = "stiffness"`: the effective stiffness; with contact, secants under unit loads of both signs."""
 
 from typing import Any
 

@@ -62,7 +62,7 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the fibres of a case, a result or an image as a table, or write it to a file."""
+    """Print or write a table of the fibres of a case, result or image; on writing, also draw an image's circles."""
     from feti_homog.commands import listed_fibres, micrograph
 
     if arguments.image is None:

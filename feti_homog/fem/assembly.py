@@ -242,7 +242,7 @@ def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """Return the nodes (sides, M + 1) along the marked torus edges, with the body on the left."""
+    """Return the nodes (sides, intervals + 1) along the torus edges in a mask, ordered with the body on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

@@ -181,7 +181,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Multiply a state by `scale`; `energy` is <sigma:eps> of the state.  Collective."""
+        """Multiply a state by `scale`; `energy` is twice the stored energy of the state per cell area.  Collective."""
         means = scale * state.solution.strain[: len(stress)], scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)

@@ -24,8 +24,8 @@ LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     """Return the interface number (phases, phases) of each pair of phases.
 
-    The number is -1 where two phases never part.  An interface without `between`, or perfect bonding, lies between the
-    matrix (the first phase) and all other phases.
+    The number is -1 for a pair without an interface.  An interface without `between` joins the matrix (the first phase)
+    to all other phases; so does number 0 in a case without interfaces, whose bonding is perfect.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):

@@ -184,10 +184,10 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
 
 def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
-    """Return the stress drops, and the strain jumps at constant load.
+    """Return the stress drops, and the strain jumps at one load, that exceed LEAST_DROP; `legs` is as in `kept`.
 
     A drop leads from a peak to the next valley.  On the first leg of an event path, a drop also leads from each load at
-    which bonds break to the next point that a rising load reaches.  Under a prescribed stress the strain jumps.
+    which bonds break to the next point that a rising load reaches.  A jump leads across all points at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)

@@ -51,7 +51,7 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """Write a key nearly as in TOML, in one short line, with quotes unless it is a bare key."""
+    """Return a key as in TOML, in quotes unless bare; a key of more than LONGEST_VALUE characters is cut off."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 

@@ -128,11 +128,11 @@ class SweepTable:
         return ", ".join(labels)
 
     def curves(self, point: int) -> tuple[Float, Float]:
-        """Return the stress-strain curves of a point on a common grid of strains.
+        """Return the stress-strain curves of a point of the sweep, all at the same strains.
 
         Returns:
-            Strains (g,), g = CURVE_POINTS, and c stresses of n finished realisations, (n, g, c).  Both are empty if
-            the cases are not straight paths, or no strain rises with the load.
+            Strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of one
+            leg whose strain rises with the load.  Both are empty if n = 0.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:

@@ -128,10 +128,10 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
-    """Check the heat of an increment without breaks: tractions at its end times the growth of slips.
+    """Check the friction heat of an increment without breaks: its final tractions times the changes of slip.
 
-    The error is relative to these tractions times the slips at both ends, plus the rounding of the energies.  The
-    work in the result is no evidence: runs compute it as the sum of stored energy, loss and heat.
+    The error is relative to these tractions times the slips before and after the increment, plus the rounding of the
+    energies.  The work in the result is no evidence: runs sum it from energies and heat.  Other steps are not checked.
     """
     files, at = cell.files, state.point
     points = files.document["path"]

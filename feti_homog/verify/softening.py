@@ -69,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute the damage levels (n + 1,) of n teeth: openings in geometric progression, in the longer pure mode."""
+        """Compute damage levels (n + 1,): openings have a constant ratio, in the pure mode of larger end / delta_0."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))

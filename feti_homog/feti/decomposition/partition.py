@@ -106,7 +106,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Choose piece counts (b,), in all `count`, for bodies with `load` (b,) triangles; large pieces divide first."""
+    """Choose piece counts (b,) of bodies of `load` (b,) triangles: divide the largest piece until there are `count`."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)

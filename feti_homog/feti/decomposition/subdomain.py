@@ -221,11 +221,11 @@ class Subdomain:
         return K if self._support is None else (K + self._support).tocsr()
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Compute rho Rf Rf^T (f, f) on fixing dofs (f,), which makes K + rho Rf Rf^T SPD.
+        """Compute fixing dofs (f,), and the block rho Rf Rf^T (f, f) on these dofs whose sum with K is SPD.
 
         The inverse of the sum is a generalized inverse K+ of K (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME
-        88, 2011).  Rf is the orthonormalised kernel on at most three nodes of `candidates`, far apart; rho is the mean
-        diagonal entry of K on their dofs.  Returns the dofs and the block.
+        88, 2011).  The dofs belong to one to three nodes of `candidates`, far apart; Rf is the kernel on these dofs,
+        orthonormalised, and rho the mean diagonal entry of K on them.  Both results are empty if K has no kernel.
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))

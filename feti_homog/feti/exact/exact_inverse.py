@@ -26,16 +26,16 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
-    """The preconditioner z = H r, with the inverse H of the dual operator on the active rows.
+    """The preconditioner z = H r, with the inverse H of the projected dual operator on the active rows.
 
     Attributes:
         neighbours: adjacent interface nodes.
-        stiffness: (all rows,) upper bounds for the diagonal of H: both nodes and their spring in series, while all
-            other nodes are fixed.
+        reference: factored reference cell.
+        stiffness: (all rows,) upper bounds on H_ii: stiffness of two nodes and a spring in series, other nodes fixed.
         norm: upper bound of |H|.
         factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns above which unused columns are dropped; takes effect at the next restart.
+        most_followed: number of columns above which unused columns are dropped; read when following starts anew.
     """
 
     is_exact = True

@@ -216,9 +216,9 @@ class FollowedResponse:
         return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
-        """Return columns (owned rows, k) at global rows (k,), and entries of all ranks.  Collective.
+        """Return columns (owned rows, k) of Gamma at global rows (k,), and rows of [columns, U].  Collective.
 
-        The entries of these columns and of U (k + all columns, k + v) are at `rows`, then at all rows with columns.
+        The second array (k + all columns, k + v), equal on all ranks, has rows `rows`, then all rows with a column.
         """
         self._now += 1
         self._used[self._slot[rows]] = self._now

@@ -182,7 +182,7 @@ class CoulombFaces(FaceSystem):
         return allowed
 
     def _known(self, status: Status) -> Status:
-        """Set the statuses (n,) of touching faces without friction to FORWARD."""
+        """Return statuses (n,) in which touching faces without friction are FORWARD."""
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:

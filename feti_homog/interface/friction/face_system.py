@@ -111,7 +111,7 @@ class FaceSystem:
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Update `FollowedStatuses` to given free rows; return None with free motions, or before updates pay off."""
+        """Update and return `FollowedStatuses` for given rows; None at a tiny pivot, or while factoring is cheaper."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None

@@ -1,11 +1,11 @@
-"""The linear system of debonded faces with prescribed statuses, factored or updated from neighbouring statuses.
+"""The linear system of debonded faces with prescribed statuses, factored, or updated when a few statuses change.
 
-The rows of M x = c are x_j for prescribed entries, (S x)_j for free entries, and (S x)_j + s mu (S x)_n for a slip that
-grows with the sign s.  A row r in place of row j changes R = [M^-1; S M^-1] by rank one,
+The rows of M x = c are x_j for prescribed entries, (S x)_j for free entries, and (S x)_j + s mu (S x)_j-1 for a slip j
+of sign s beside the normal jump j - 1.  A row r in place of row j changes R = [M^-1; S M^-1] by rank one,
 
     R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
 
-where w is a row of R, or a sum of two.  Changes are collected, and added to R in blocks.
+where w is a row of R, or a sum of two; S, x and mu are as in `coulomb_faces`.  Changes are added to R in blocks.
 """
 
 from collections.abc import Callable

@@ -144,7 +144,7 @@ class BondLaw(ABC):
     def mode_angle(self, traction: Float) -> Float:
         """Return the mode angle psi (p,) of tractions (p, c), in radians.
 
-        The angle is 0 in opening, and pi/2 in shear, also under pressure.
+        The angle is 0 under a normal traction alone, and pi/2 in shear without tension, with or without pressure.
         """
         shear = np.linalg.norm(traction[:, 1:], axis=1)
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))

@@ -152,9 +152,9 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Break the next tooth of the bonds `which` (k,).
+        """Break the next tooth of the bonds that the mask `which` (k,) selects.
 
-        Return the numbers of broken teeth (k, 1), and the mask (k,) of bonds that lose the last tooth.
+        Return the new numbers of broken teeth (k, 1), and the mask (k,) of bonds whose last tooth breaks.
         """
         history = bonds.history + which[:, None]
         return history, which & (history[:, 0] >= len(self.levels) - 1)

@@ -153,10 +153,10 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance in one step to a leg fraction, or as far as the cell carries the load.  Collective.
+        """Advance in one step to a leg fraction, or as far as the cell carries the load; set `limit`.  Collective.
 
         Raises:
-            NotCarriedError: the cell carries nothing beyond the last step.
+            NotCarriedError: the cell carries no more load than before; StuckError: no statuses are admissible.
         """
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 

@@ -102,7 +102,7 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
 
 @contextmanager
 def missing_letters_as_boxes() -> Iterator[None]:
-    """Draw letters that the font lacks as boxes, without warnings."""
+    """Silence, in a `with` block, the warnings about letters that the font lacks; Matplotlib draws boxes instead."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
         yield

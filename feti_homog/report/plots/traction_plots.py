@@ -98,7 +98,7 @@ def _limit(axes: Axes, values: Array) -> None:
 def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw.
 
-    For a path, these are the peak, and the valley after it or a late state; for other analyses, one state.
+    For a path: peak (or first state), then valley or last state with tractions; else the middle of partial debonding.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}

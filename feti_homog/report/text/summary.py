@@ -95,7 +95,7 @@ def summary(document: Document) -> str:
 
 
 def short_summary(document: Document) -> str:
-    """Return the tables, the largest check error and the status of a result."""
+    """Return the title, the tables, the largest check error and the status of a result."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
     verdict += _field("Status", [str(document["status"])])

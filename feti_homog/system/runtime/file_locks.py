@@ -125,7 +125,7 @@ def holder(path: Path) -> str | None:
 
 
 def this_process() -> str:
-    """Return the name of this process in lock files: machine, process, and SLURM or PBS job."""
+    """Return the name of this process in lock files: machine, process number, and SLURM or PBS job if any."""
     names = [socket.gethostname(), f"process {os.getpid()}"]
     job = os.environ.get("SLURM_JOB_ID") or os.environ.get("PBS_JOBID")
     return ", ".join([*names, f"job {job}"] if job else names)
