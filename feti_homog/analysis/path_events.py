@@ -186,8 +186,7 @@ def resumable(context: AnalysisContext) -> int:
     """
     say = context.progress.say
     if not context.resume:
-        if dropped := context.checkpoint.clear():
-            say(f"  dropped events of an earlier run: {dropped}; --resume would have gone on from them")
+        context.checkpoint.clear()  # events of other runs, which `output_folder.replaced` names
         return 0
     stored_events = context.checkpoint.count()
     if (count := holding(context, consistent(context, stored_events))) < stored_events:

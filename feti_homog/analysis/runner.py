@@ -51,6 +51,8 @@ def run(
             return Result.of(mpi_errors.on_root(comm, result_json.read, directory))
     mpi_errors.on_root(comm, output_folder.usable, directory)
     mpi_errors.on_root(comm, output_folder.refuse_files_of_others, directory)
+    if not resume and (line := mpi_errors.on_root(comm, output_folder.replaced, directory, case)):
+        progress.say(line)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
@@ -110,13 +112,13 @@ def _run_and_write(
             file = field_file.FieldFile(directory, cell.comm, field_parts.header(cell), *parts)
     with (
         file or nullcontext(),
-        closing(output_folder.EventLog(directory, cell.comm, cell.case.name, progress.say)) as log,
+        closing(result_json.EventLog(directory, cell.comm, cell.case.name, progress.say)) as log,
     ):
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         # No function in the context may refer to the context: garbage collection on one rank would then close the
         # parallel file, which is a collective call.
-        context = replace(context, directory=directory, resume=resume, log=log.write, events=output_folder.LOG)
+        context = replace(context, directory=directory, resume=resume, log=log.write, events=result_json.LOG)
         context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
         analysis = _analyse(context)
         seal = states.seal()
@@ -153,14 +155,13 @@ def _run_and_write(
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
     """Write result.json and the other result files; remove files of earlier results.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME}
+    written = {result_json.NAME} | ({result_json.LOG} if cell.case.section.is_followed else set())
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
     points = vars(result).get(name := cell.case.analysis.type)
     if points is not None:
         rows = points if isinstance(points, tuple) else (points,)
         written.add(mpi_errors.on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
-    written |= {output_folder.LOG} if cell.case.section.is_followed else set()
     mpi_errors.on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 

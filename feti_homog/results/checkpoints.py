@@ -60,10 +60,9 @@ class EventsInMemory:
     def __init__(self, comm: Intracomm, room: int | None = WHOLE_BYTES) -> None:
         self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
-    def clear(self) -> int:
-        """Remove all events; return the number of removed events."""
-        number, self._events, self._bytes = len(self._events), [], 0
-        return number
+    def clear(self) -> None:
+        """Remove all events."""
+        self._events, self._bytes = [], 0
 
     def count(self) -> int:
         """Check all events; return the number of events.
@@ -115,21 +114,14 @@ class Checkpoint(EventsInMemory):
         self.path, self.signature = directory / FOLDER / NAME, signature
         self._ends: list[int] = []  # ends of the records on rank 0; the first record is the signature
 
-    def clear(self) -> int:
-        def cleared() -> int:
-            try:
-                number = self._count_records()
-            except CaseError:  # the file of another run counts as one event
-                number = 1
-            remove(self.path.parents[1])
-            self._ends = []
-            return number
-
-        return mpi_errors.on_root(self.comm, cleared)
+    def clear(self) -> None:
+        self._ends = []
+        mpi_errors.on_root_only(self.comm, remove, self.path.parents[1])
 
     def count(self) -> int:
         def counted() -> int:
-            if number := self._count_records():
+            self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
+            if number := max(len(self._ends) - 1, 0):
                 first, own = next(records(self.path))[1].decode(), self.signature.partition("\n")[0]
                 if (written := first.partition("\n")[0]) != own:
                     raise CaseError(f"{self.path} is of another run: expected {own}; found {written}")
@@ -170,10 +162,6 @@ class Checkpoint(EventsInMemory):
             self._ends.append(self._ends[-1] + len(content))
 
         mpi_errors.on_root(self.comm, append)
-
-    def _count_records(self) -> int:
-        self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
-        return max(len(self._ends) - 1, 0)
 
 
 def begin(signature: str) -> bytes:

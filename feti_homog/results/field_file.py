@@ -82,13 +82,8 @@ class FieldFile:
         self._file = self._agreed(
             mpi_errors.agree_after, lambda: self._opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
         )
-        self._agreed(
-            mpi_errors.agree_after,
-            _set_attributes,
-            self._file,
-            "/",
-            field_layout.attributes(header) | {"created_by": field_layout.PROGRAM},
-        )
+        attributes = field_layout.attributes(header) | {"created_by": field_layout.PROGRAM}
+        self._agreed(mpi_errors.agree_after, _set_attributes, self._file, "/", attributes)
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
         self._write_part("interface", interface)
@@ -211,9 +206,7 @@ def _create(part: Path, size: int) -> None:
 
 
 def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None:
-    target = file[name]
-    for key, value in attributes.items():
-        target.attrs[key] = value
+    file[name].attrs.update(attributes)
 
 
 def _reserve(part: Path, start: int, size: int) -> None:

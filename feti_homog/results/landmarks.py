@@ -138,12 +138,8 @@ def marks(document: path_curves.Document) -> dict[int, str]:
     """Return the titles of all landmarks by point number, in ascending order."""
     peak = peak_of(document)
     largest = name_of(document, peak)
-    places = {
-        "first softening": "first_softening_event",
-        "first break": "first_break_event",
-        largest: "event",
-        f"after the {largest}": "event_left",
-    }
+    places = {"first softening": "first_softening_event", "first break": "first_break_event"}
+    places |= {largest: "event", f"after the {largest}": "event_left"}
     entries = {title: peak[name] for title, name in places.items() if name in peak}
     entries["end"] = len(document["path"]) - 1
     numbers = sorted({int(number) for number in entries.values()})
@@ -191,8 +187,7 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
-    largest = float(size.max())
-    least = LEAST_DROP * largest
+    least = LEAST_DROP * (largest := float(size.max()))
     entries = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
     per_strain = largest / (float(length.max()) or 1.0)
     load = np.array([point["load_factor"] for point in points])
@@ -231,8 +226,7 @@ def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | Non
     fixed = {0, len(numbers) - 1}
     of_events = document["case"]["path"]["method"] == "events"
     around = drops(points, path_curves.legs(document) if of_events else 0)
-    deepest = max(around)[1:] if around else ()
-    for group in (marks(document), deepest, path_curves.ends_of_legs(document)):
+    for group in (marks(document), max(around, default=())[1:], path_curves.ends_of_legs(document)):
         places = np.flatnonzero(np.isin(numbers, list(group))).tolist()
         fixed = fixed.union(places) if len(fixed.union(places)) <= rows else fixed
     broken = np.cumsum([point["broke"] for point in points])[numbers]

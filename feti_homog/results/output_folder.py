@@ -1,4 +1,4 @@
-"""Lock and check the result folder, and write its events.log.
+"""Lock and check the result folder.
 
 One run at a time writes to the folder, and replaces no foreign file.  A run recognizes result files by content, not by
 a marker in the folder: a user may later add a foreign file with such a name.
@@ -11,20 +11,19 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-from feti_homog import __version__
+from feti_homog.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
 from feti_homog.results import atomic, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
+from feti_homog.schema import wording
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import file_locks, input_files
 from feti_homog.typing import Intracomm
 
 LOCK = "result.lock"
-LOG = "events.log"  # one line for each event, for users to follow a running path
-LOG_HEADER = "# feti-homog: events"  # beginning of the first line, which identifies a log of this program
 LONGEST = "case_minus_temperature.png"  # longest file name of a run
 # All files of a result, for all analyses and the commands `plot` and `fields`.
 RESULT_FILE = re.compile(
@@ -36,7 +35,7 @@ RESULT_FILE = re.compile(
     r"|state_\d+\.(png|pdf|svg)"
 )
 # Files that show that a run has written to the folder.
-SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
+SIGNS = (result_json.NAME, field_file.NAME, result_json.LOG, LOCK)
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -93,6 +92,31 @@ def refuse_files_of_others(directory: Path) -> None:
         raise foreign(directory, foreign_files[0].name, "run")
 
 
+def replaced(directory: Path, case: Case) -> str:
+    """Return a line about the other result that a run of `case` replaces, or "".  Call on one rank.
+
+    Raises:
+        CaseError: the folder has events of this case, from which a run can go on.
+    """
+    path, contents, line = directory / "checkpoint/events", list[bytes](), ""
+    if not path.is_file() and not os.path.lexists(directory / result_json.NAME):
+        return ""
+    from feti_homog.results import checkpoints  # only paths have checkpoints
+
+    try:
+        contents += [content for _, content in checkpoints.records(path)] if path.is_file() else []
+        if len(contents) > 1 or os.path.lexists(directory / result_json.NAME):
+            stored = latest(directory)
+            title = f"{wording.toml_value(stored['case']['name'])} ({stored['date']}, {stored['status']})"
+            line = f"replaces the result of case {title}" * (stored["digest"] != case.digest())
+    except (FetiHomogError, LookupError, TypeError) as error:
+        line = f"replaces a result that cannot be read: {error}"
+    if len(contents) > 1 and contents[0].startswith(b"case %s," % case.digest(False).encode()):
+        way = f"--resume goes on from them; remove {path.parent} to start again"
+        raise CaseError(f"--out {directory}: it holds {len(contents) - 1} events of this path: {way}")
+    return line and f"warning: {directory}: this run {line}"
+
+
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
     """Return the error for a foreign file with the name of a result."""
     return CaseError(
@@ -113,7 +137,7 @@ def _is_own(path: Path) -> bool:
         head = stream.read(1 << 20)  # contains the attributes of result.h5
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
-    return path.name != LOG or head.startswith(LOG_HEADER.encode())
+    return path.name != result_json.LOG or head.startswith(result_json.LOG_HEADER.encode())
 
 
 def latest(directory: Path) -> dict[str, Any]:
@@ -205,7 +229,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
     """Remove the result files whose names are not in `written`, and events if no log is written.  Call on one rank."""
-    if LOG not in written and (directory / "checkpoint").is_dir():
+    if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 
         checkpoints.remove(directory)
@@ -246,38 +270,3 @@ def _remove_empty(folders: list[Path]) -> None:
 
 def _busy(directory: Path, who: str) -> CaseError:
     return CaseError(f"--out {directory}: another run writes its results there: {who}; choose another folder or wait")
-
-
-class EventLog:
-    """The event log in a result folder, which rank 0 writes; the first line replaces an earlier log.
-
-    After a write error `say` gets one warning, and the path continues without the log, which holds no results.
-    """
-
-    def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
-        self.path, self._title, self._say = directory / LOG, title, say
-        self._wanted = comm.rank == 0
-        self._stream: TextIO | None = None
-
-    def write(self, line: str) -> None:
-        """Append a line to the log."""
-        if not self._wanted:
-            return
-        try:
-            with atomic.file_errors("write", self.path):
-                if self._stream is None:
-                    if self.path.is_fifo():  # opening a pipe would wait for a reader
-                        self.path.unlink()
-                    self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
-                    print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)
-                print(line.strip(), file=self._stream)
-        except FetiHomogError as error:
-            self._say(f"warning: {error}; the path goes on without it")
-            self.close()
-
-    def close(self) -> None:
-        """Close the log."""
-        self._wanted = False
-        if self._stream is not None:
-            with contextlib.suppress(OSError):  # the stream has no unwritten line
-                self._stream.close()

@@ -1,9 +1,10 @@
-"""Read and write result.json, write points as CSV tables, and seal files by checksums.
+"""Read and write result.json, write points as CSV tables and event logs, and seal files by checksums.
 
 Each file is written completely or not at all.  A checksum in a JSON document, or beside a large file, reveals damage
 and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
 """
 
+import contextlib
 import csv
 import io
 import json
@@ -11,21 +12,25 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, TextIO, get_type_hints
 
 import numpy as np
 
+from feti_homog import __version__
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
 from feti_homog.system.runtime import described, input_files, records
+from feti_homog.typing import Intracomm
 
 NAME = "result.json"
 KEY = "checksum"
 BLOCK = 1 << 26  # bytes of one read
 ENCODE = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+LOG = "events.log"  # one line for each event, for users to follow a running path
+LOG_HEADER = "# feti-homog: events"  # beginning of the first line, which identifies a log of this program
 SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, or disappears
 
 
@@ -147,6 +152,41 @@ def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
     return stream.getvalue()
+
+
+class EventLog:
+    """The event log in a result folder, which rank 0 writes; the first line replaces an earlier log.
+
+    After a write error `say` gets one warning, and the path continues without the log, which holds no results.
+    """
+
+    def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
+        self.path, self._title, self._say = directory / LOG, title, say
+        self._wanted = comm.rank == 0
+        self._stream: TextIO | None = None
+
+    def write(self, line: str) -> None:
+        """Append a line to the log."""
+        if not self._wanted:
+            return
+        try:
+            with atomic.file_errors("write", self.path):
+                if self._stream is None:
+                    if self.path.is_fifo():  # opening a pipe would wait for a reader
+                        self.path.unlink()
+                    self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
+                    print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)
+                print(line.strip(), file=self._stream)
+        except FetiHomogError as error:
+            self._say(f"warning: {error}; the path goes on without it")
+            self.close()
+
+    def close(self) -> None:
+        """Close the log."""
+        self._wanted = False
+        if self._stream is not None:
+            with contextlib.suppress(OSError):  # the stream has no unwritten line
+                self._stream.close()
 
 
 def dumps(document: Mapping[str, Any]) -> str:

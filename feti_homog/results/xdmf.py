@@ -73,10 +73,8 @@ def write(directory: Path) -> list[Path]:
         longest = max((len(label.encode()) for label in labels), default=0)
         for name in (CELL, INTERFACE) if len(file["interface/points"]) else (CELL,):
             root = ET.Element("Xdmf", Version="3.0")
-            title = "cell" if name == CELL else "interface"
-            collection = ET.SubElement(
-                ET.SubElement(root, "Domain"), "Grid", Name=title, GridType="Collection", CollectionType="Temporal"
-            )
+            form = {"Name": "cell" if name == CELL else "interface", "GridType": "Collection"}
+            collection = ET.SubElement(ET.SubElement(root, "Domain"), "Grid", form, CollectionType="Temporal")
             for state, label in zip(states, labels, strict=True):
                 # One collection for each state: readers show grid names only inside a spatial collection.
                 kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
@@ -121,8 +119,7 @@ def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) ->
     number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
     item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
     item.text = " ".join(map(repr, values))
-    attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Grid")
-    attribute.append(item)
+    ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Grid").append(item)
 
 
 def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:

@@ -188,9 +188,12 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     coarse = case_file(tmp_path, name="coarse", mesh_size="mesh_size = 0.2")
     job = command_line(2, "run", coarse, "--out", tmp_path / "new", "--resume")
     assert job.returncode == 0 and "there is no checkpoint" in job.stdout
-    shutil.copytree(interrupted, tmp_path / "old")
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "old")
-    assert job.returncode == 0 and "dropped events of an earlier run: " in job.stdout
+    shutil.copytree(interrupted, out := tmp_path / "old")
+    job = command_line(2, "run", case_file(tmp_path), "--out", out)
+    way = f"--resume goes on from them; remove {out / 'checkpoint'} to start again"
+    assert job.returncode == 2 and f"error: --out {out}: it holds 5 events of this path: {way}\n" in job.stderr
+    before, after = ({path.relative_to(of) for path in of.rglob("*")} for of in (interrupted, out))
+    assert events.count(out) == 5 and before == after
 
 
 @pytest.mark.parametrize(

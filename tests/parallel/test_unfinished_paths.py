@@ -107,6 +107,60 @@ def test_curves_and_page_tell_that_the_path_is_unfinished(comm, shared_path):
     assert on_root(comm, drawn) == ["energy.png", "path.png"]
 
 
+DAMAGED = '{"version": "", "case": {}, "solver": {}}'
+
+
+def test_a_run_that_does_not_resume_leaves_the_events_of_its_case(comm, shared_path):
+    """Also where a result has all points, and a result.json is damaged; not where nothing goes on from the events."""
+
+    def kept() -> dict[Path, bytes]:
+        return {path: path.read_bytes() for path in shared_path.rglob("*") if path.is_file()}
+
+    short = Case.parse(CASE | {"path": CASE["path"] | {"max_events": 2}})
+    with pytest.raises(ConvergenceError, match="max_events"):
+        run(short, comm, out=shared_path)
+    for damage in ("", DAMAGED):
+        on_root(comm, lambda text=damage: text and (shared_path / result_json.NAME).write_text(text))
+        before = on_root(comm, kept)
+        with pytest.raises(CaseError) as error:
+            run(Case.parse(CASE | {"name": "other"}), comm, out=shared_path)
+        way = f"--resume goes on from them; remove {shared_path / 'checkpoint'} to start again"
+        place = f"--out {shared_path}: it holds 2 events of this path"
+        parallel_assert(comm, error.value.faults == (f"{place}: {way}",), str(error.value))
+        parallel_assert(comm, on_root(comm, kept) == before)
+    on_root(comm, checkpoints.remove, shared_path)
+    assert run(Case.parse(CASE), comm, out=shared_path).resumed == 0
+
+
+OTHER = CASE | {"name": "stiffer", "interface": {"normal_strength": 4.1, "tangential_strength": 3.0}}
+LEFT = {
+    "nothing": (None, ""),
+    "its own": (CASE | {"name": "renamed"}, ""),
+    "another": (OTHER, 'replaces the result of case "stiffer" (20'),
+    "another, begun": (OTHER, ", unfinished, 6 points up to load 0."),
+    "another, damaged": (OTHER, "replaces a result that cannot be read: "),
+}
+
+
+@pytest.mark.parametrize("kind", LEFT)
+def test_a_run_names_the_other_case_that_it_replaces(comm, shared_path, kind, capsys):
+    case, expected = LEFT[kind]
+    if kind.endswith("begun"):
+        with interrupted(), pytest.raises(RuntimeError, match="interrupted"):
+            run(Case.parse(case), comm, out=shared_path)
+    elif case:
+        run(Case.parse(case), comm, out=shared_path)
+    if kind.endswith("damaged"):
+        on_root(comm, (shared_path / result_json.NAME).write_text, DAMAGED)
+    comm.barrier()
+    capsys.readouterr()
+    run(Case.parse(CASE), comm, out=shared_path, quiet=False)
+    lines = [line for line in capsys.readouterr().out.splitlines() if "replaces" in line]
+    named = [f"warning: {shared_path}: this run "] * bool(expected and comm.rank == 0)
+    parallel_assert(comm, len(lines) == len(named), str(lines))
+    parallel_assert(comm, all(named[0] in line and expected in line for line in lines))
+
+
 def test_cards_and_certificates_name_the_points_of_an_unfinished_path(comm, shared_path):
     begun(comm, shared_path, CASE["path"])
 

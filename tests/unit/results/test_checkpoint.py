@@ -52,7 +52,9 @@ def ends_of(checkpoint: Checkpoint) -> list[int]:
 def test_what_was_written_is_read(tmp_path):
     checkpoint = written(tmp_path)
     assert checkpoint.count() == EVENTS and same(map(checkpoint.read, range(EVENTS)))
-    assert checkpoint.clear() == EVENTS and checkpoint.count() == 0 and checkpoint.clear() == 0
+    for _ in range(2):
+        checkpoint.clear()
+        assert checkpoint.count() == 0
     assert list(tmp_path.iterdir()) == []
 
 
@@ -148,7 +150,8 @@ def test_a_file_of_another_format_is_refused(tmp_path):
     expected = rf"events has the checkpoints' format {FORMAT + 1}, this program reads format {FORMAT};"
     with pytest.raises(CaseError, match=expected):
         checkpoint.count()
-    assert checkpoint.clear() == 1 and list(tmp_path.iterdir()) == []
+    checkpoint.clear()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("bit", range(8))
@@ -168,7 +171,7 @@ def test_any_flipped_bit_is_refused(tmp_path, bit):
 def test_nothing_but_events_is_removed(tmp_path):
     checkpoint = written(tmp_path)
     (tmp_path / "checkpoint" / "weights.pt").write_text("mine")
-    assert checkpoint.clear() == EVENTS
+    checkpoint.clear()
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["weights.pt"]
 
 
