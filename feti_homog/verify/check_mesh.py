@@ -199,9 +199,10 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
     """Check G = G_I + G_II and the mode psi, and compare the places and lengths of tips with the mesh."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
-    table = {name: np.array(tips[name]) for name in ("G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load")}
-    G, first, second, psi, length, angle, number, load = table.values()
+    names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load"
+    G, first, second, psi, length, angle, number, load = (np.array(tips[name]) for name in names)
     pair, turn = np.array(tips.get("interface", np.ones(len(G)))), np.radians(psi)
+    tips.leaves_open("G", "G_I", "G_II")
     findings.compare("rates", G, first + second, np.abs(G), at)
     findings.compare("rates", first * np.sin(turn) ** 2, second * np.cos(turn) ** 2, np.abs(G), at)
     findings.record("rates", np.where(np.isin(load, LOADS), 0.0, np.inf), at)
@@ -212,8 +213,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
         radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
-        off += chords.min(initial=np.inf) > ROUNDING * radius
-        findings.record("rates", max(off - ROUNDING, 0.0), at(t))
+        findings.record("rates", max(off + (chords.min(initial=np.inf) > ROUNDING * radius) - ROUNDING, 0.0), at(t))
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:

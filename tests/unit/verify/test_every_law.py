@@ -13,6 +13,7 @@ from unit.verify import (
     test_falsified_spatial_results,
 )
 
+from feti_homog.verify.certificate import verify
 from feti_homog.verify.findings import checks
 
 pytestmark = pytest.mark.slow
@@ -131,3 +132,13 @@ def test_every_law_is_broken_by_some_example():
     """The law of given displacements on sides by a user's mesh: `test_falsified_sides`."""
     known = {*BREAK, "sides"}.union(*(laws for table in TABLES for _, _, laws in table.values()))
     assert {check.name for check in checks(1e-8, users_mesh=False, has_coatings=False)} <= known
+
+
+def test_sizes_of_energy_release_rates_are_listed_as_unchecked(results, tmp_path):
+    """Their sums and modes are checked: a common factor breaks no law."""
+    names = ("G", "G_I", "G_II")
+    edit = both(*(document("tips", name, 0, factor=1.1) for name in names))
+    certificate = verify(falsified(results("contact"), tmp_path / "out", edit))
+    listed = {name for table in certificate.unchecked.values() for name in table}
+    assert {finding.name for finding in certificate.findings if not finding.holds} == {"files"}
+    assert {f"tips.{name}" for name in names} <= listed
