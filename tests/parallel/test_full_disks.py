@@ -121,7 +121,7 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
         document = json.loads((out / "result.json").read_text())
         assert document["status"] == "done" and "result.h5: No space left on device" in document["faults"][0]
         parallel_assert(comm, cli.main(["report", str(out)]) == 2)
-        words = ["result.h5: it is missing; run the case again with --resume: the checkpoint has its events"]
+        words = ["result.h5: it is missing; run the case again with [output] fields = true and --resume: "]
         told_once(comm, capsys, words)
     later = ("result.json", "events")
     parallel_assert(comm, (out / "result.json").exists() == (name not in later) and not (out / name).exists())

@@ -142,5 +142,7 @@ def test_a_result_that_the_program_has_open_is_one_line(results):
 
 
 def test_a_result_without_fields_is_one_line(tmp_path):
-    with pytest.raises(CaseError, match=r"^cannot read .*result.h5: it is missing; run the case again$"):
+    with pytest.raises(
+        CaseError, match=r"^cannot read .*result.h5: it is missing; run the case again with \[output\] fields = true$"
+    ):
         read_state(tmp_path)
