@@ -36,9 +36,11 @@ def fit_text(document: Document, axes: str = "") -> str:
     rows = [[label, *(datum[n] for n in NUMBERS)] for label, datum in zip(data, measured, strict=True)]
     printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
-    squares = document["sum_of_squares"]
-    total = "beyond all numbers" if squares is None else f"{squares:.4g}"
+    total = "beyond all numbers" if (squares := document["sum_of_squares"]) is None else f"{squares:.4g}"
     last = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
+    intervals = ((name, row, row["interval"]) for name, row in document["unknowns"].items() if row["std"] is not None)
+    wide = [name for name, row, (low, high) in intervals if not row["lower"] <= low <= high <= row["upper"]]
+    last += [f"Remark: {', '.join(wide)}: the interval reaches beyond the bounds, which it ignores"] * bool(wide)
     ends = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
     label, worst = max(zip(data, (abs(d["residual"]) for d in measured), strict=True), key=lambda pair: pair[1])
     if ends and worst > MOST_DEVIATIONS:
@@ -83,11 +85,9 @@ def scatter_text(document: Document) -> str:
         lines.append("Negative shares: correlated numbers act against each other")
     if any(result["mesh_error"] is None for result in results):
         lines.append("+- mesh: for stiffnesses, constants, conductivities alone, with [output] mesh_error = true")
+    several = [result for result in results if result["derivative_errors"]]
     for k, number in enumerate(inputs):
-        slopes = [
-            (r["name"], r["derivative_errors"][k], r["derivatives"][k]) for r in results if r["derivative_errors"]
-        ]
-        noisy = ", ".join(name for name, error, slope in slopes if 2 * error > abs(slope))
+        noisy = ", ".join(r["name"] for r in several if 2 * r["derivative_errors"][k] > abs(r["derivatives"][k]))
         start = f"Standard error over the cells above half of the slope by {number['name']}"
         lines += [f"{start}: {noisy}"] if noisy else []
     return "\n".join(lines)
