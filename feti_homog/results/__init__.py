@@ -1,7 +1,7 @@
 """Write result files completely or not at all: `result.json`, `result.h5`, `result.xdmf`, tables, checkpoints.
 
-Imports `case`, `fem`, `homogenization`, `materials`, `system` and `verify`.  Main entries: `field_file.FieldFile`,
-`result_json.write`, `viewed_states.read_state`.
+Imports `case`, `fem`, `homogenization`, `materials`, `schema`, `system` and `verify`.  Main entries:
+`field_file.FieldFile`, `result_json.write`, `viewed_states.read_state`.
 """
 
 __all__ = [
