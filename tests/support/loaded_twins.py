@@ -156,6 +156,14 @@ def is_end(point, legs):
     return any(abs(point.load_factor * legs - k) < 1e-12 for k in range(1, legs + 1))
 
 
+def closed_faces(state):
+    """Return the number of faces under pressure, and with faces that touch without a force."""
+    force, gap = np.abs(state.force[:, 0]), np.abs(state.jump[:, 0])
+    has_force = force > 1e-9 * force.max()
+    touches = ~has_force & (gap <= 1e-9 * np.abs(state.jump).max())
+    return int((state.closed & has_force).sum()), int((state.closed | touches).sum())
+
+
 def compare_paths(comm, tolerance=1e-8, steps=12, **case):
     """Return the result of a path whose points are those of the oracle, and the events. Collective.
 
@@ -183,8 +191,8 @@ def compare_paths(comm, tolerance=1e-8, steps=12, **case):
         assert error < tolerance, f"{name}: {error:.1e}"
     # Where nothing is stored faces touch without a force.
     most = max(s.stored for s in states)
-    loaded = [(p.closed, int(s.closed.sum())) for p, s in zip(points, states, strict=True) if s.stored > 1e-9 * most]
-    assert all(found == expected for found, expected in loaded)
+    loaded = [(p.closed, *closed_faces(s)) for p, s in zip(points, states, strict=True) if s.stored > 1e-9 * most]
+    assert all(least <= found <= most for found, least, most in loaded), loaded
     between = [p for p in result.path if not (p.broke or is_end(p, legs))]
     if between:
         for name, expected in zip(("strain", "stress"), twin.between(between, events), strict=True):

@@ -88,10 +88,10 @@ def error(found, expected):
     """Largest difference of entries.
 
     It is, of a stiffness, relative to the root of the product of its diagonal entries, else to the largest entry, or to
-    1e-12 where there is none.
+    1e-9 where there is none, of moduli about 1.
     """
     difference, expected = np.abs(found - expected), np.asarray(expected)
     if expected.ndim == 2:
         size = np.sqrt(expected.diagonal())
         return float((difference / np.outer(size, size)).max())
-    return float(difference.max() / max(np.abs(expected).max(), 1e-12))
+    return float(difference.max() / max(np.abs(expected).max(), 1e-9))
