@@ -1,4 +1,4 @@
-"""Time two sweeps and a loop of CHOLMOD solves on the same meshes.
+"""Compare the times of two sweeps and of CHOLMOD solves on the same meshes.
 
 One sweep runs on one rank, one has a case on each rank. All three are whole commands, start-up included, run in turns.
 The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor

@@ -75,7 +75,7 @@ class ReferenceLattice:
 
     @property
     def halvings(self) -> int:
-        """The number of halvings of the sides, each of which splits a triangle in four."""
+        """The number of times that the triangle is split in four."""
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:

@@ -98,22 +98,23 @@ def replaced(directory: Path, case: Case) -> str:
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
     """
-    path, contents, line = directory / "checkpoint/events", list[bytes](), ""
+    path, are_own, line = directory / "checkpoint/events", list[bool](), ""
     if not path.is_file() and not os.path.lexists(directory / result_json.NAME):
         return ""
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
     try:
-        contents += [content for _, content in checkpoints.records(path)] if path.is_file() else []
-        if len(contents) > 1 or os.path.lexists(directory / result_json.NAME):
+        signature = b"case %s," % case.digest(False).encode()  # begins the first record
+        are_own += [content.startswith(signature) for _, content in checkpoints.records(path)] if path.is_file() else []
+        if len(are_own) > 1 or os.path.lexists(directory / result_json.NAME):
             stored = latest(directory)
             title = f"{wording.toml_value(stored['case']['name'])} ({stored['date']}, {stored['status']})"
             line = f"replaces the result of case {title}" * (stored["digest"] != case.digest())
     except (FetiHomogError, LookupError, TypeError) as error:
         line = f"replaces a result that cannot be read: {error}"
-    if len(contents) > 1 and contents[0].startswith(b"case %s," % case.digest(False).encode()):
+    if len(are_own) > 1 and are_own[0]:
         way = f"--resume goes on from them; remove {path.parent} to start again"
-        raise CaseError(f"--out {directory}: it holds {len(contents) - 1} events of this path: {way}")
+        raise CaseError(f"--out {directory}: it holds {len(are_own) - 1} events of this path: {way}")
     return line and f"warning: {directory}: this run {line}"
 
 

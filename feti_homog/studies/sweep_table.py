@@ -128,7 +128,7 @@ class SweepTable:
         return ", ".join(labels)
 
     def curves(self, point: int) -> tuple[Float, Float]:
-        """Return the stress-strain curves of a point of the sweep, all at the same strains.
+        """Return the stress-strain curves at a point of the sweep, interpolated to common strains.
 
         Returns:
             Strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of one

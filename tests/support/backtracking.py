@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 CHARACTERS = {"LITERAL", "NOT_LITERAL", "ANY", "IN"}
-CONDITIONS = {"AT", "ASSERT", "ASSERT_NOT"}
-LIMIT = 20_000
+LIMIT = 20_000  # steps, above the steps of all linear patterns on texts of some hundred characters
 
 Ends = Callable[[int], Iterable[int]]  # places at which an item that begins at a place ends, the preferred one first
 
@@ -59,8 +58,11 @@ class Backtracking:
 
     def _item(self, item: Any) -> Ends:
         operation, argument = str(item[0][0]), item[0][1]
-        if operation in CHARACTERS | CONDITIONS:
+        if operation == "AT" or operation in CHARACTERS or (operation[:6] == "ASSERT" and argument[0] < 0):
             return self._single(item, int(operation in CHARACTERS))
+        if operation in ("ASSERT", "ASSERT_NOT"):
+            ahead = self._sequence(argument[1])
+            return lambda begin: [begin] * (any(True for _ in ahead(begin)) == (operation == "ASSERT"))
         if operation == "BRANCH":
             choices = [self._sequence(choice) for choice in argument[1]]
             return lambda begin: (end for choice in choices for end in choice(begin))
@@ -77,7 +79,7 @@ class Backtracking:
         return repeat
 
     def _single(self, item: Any, width: int) -> Ends:
-        """Return the end of a character or condition."""
+        """Return the end of a character, a position or a condition on the text before."""
         holds = re._compiler.compile(item, self._pattern.flags).match  # type: ignore[attr-defined]
 
         def ends(begin: int) -> tuple[int, ...]:

@@ -119,7 +119,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Factor the system of given rows, or return the last system if its rows are the same."""
+        """Return the factored system of given rows; reuse the last system if it has these rows."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)

@@ -1,4 +1,4 @@
-"""Check users' meshes: each function lists faults of one kind and names the first nodes or elements."""
+"""List the faults of users' meshes; each fault names its first nodes or elements."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
