@@ -135,10 +135,10 @@ class Checkpoint(EventsInMemory):
     def read(self, number: int) -> Arrays:
         def cut() -> list[Arrays]:
             event, size = unpacked(next(records(self.path, self._ends[number]))[1]), self.comm.size
-            ends = {name: event.get(f"{name}_ends") for name in event if not name.endswith("_ends")}
+            pairs = {name: (v, event.get(f"{name}_ends")) for name, v in event.items() if not name.endswith("_ends")}
             try:
-                whole = [np.split(event[n], at[:-1]) if at is not None else [event[n]] * size for n, at in ends.items()]
-                return [{name: whole[n][rank] for n, name in enumerate(ends)} for rank in range(size)]
+                whole = [[v] * size if at is None else np.split(v, at.reshape(size)[:-1]) for v, at in pairs.values()]
+                return [{name: whole[n][rank] for n, name in enumerate(pairs)} for rank in range(size)]
             except (IndexError, TypeError, ValueError) as error:
                 raise CaseError(f"{self.path} is damaged: its arrays are not of {size} ranks") from error
 

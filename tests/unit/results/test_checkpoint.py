@@ -16,8 +16,10 @@ from feti_homog.results.checkpoints import (
     PREFIX,
     Checkpoint,
     EventsInMemory,
+    packed,
     records,
     refuse_others,
+    unpacked,
 )
 
 EVENTS = 4
@@ -198,3 +200,14 @@ def test_a_checkpoint_that_is_no_folder_is_refused(tmp_path, make, kind):
     make(tmp_path / "checkpoint")
     with pytest.raises(CaseError, match=f"checkpoint is a {kind} there, and a run makes that folder"):
         refuse_others(tmp_path)
+
+
+def test_events_larger_than_any_run_writes_are_refused(monkeypatch):
+    """A few bytes can decompress to gigabytes, and no memory is taken for them."""
+    event = {"lam": np.zeros(1 << 20)}
+    content = packed(event)
+    assert len(content) < event["lam"].nbytes / 200
+    np.testing.assert_array_equal(unpacked(content)["lam"], event["lam"])
+    monkeypatch.setattr(checkpoints, "WHOLE_BYTES", 1 << 19)
+    with pytest.raises(CaseError, match="an event of the checkpoint is damaged: buffer is smaller than requested"):
+        unpacked(content)

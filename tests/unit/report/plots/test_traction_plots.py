@@ -108,3 +108,17 @@ def test_every_part_of_a_fibre_has_its_number(tmp_path: Path, radius: float, cen
     assert {text.get_text() for text in axes.texts} == {"3"}
     shown = sorted(tuple(np.round(text.get_position(), 2)) for text in axes.texts)
     np.testing.assert_allclose(shown, sorted(map(tuple, places)), atol=0.06)
+
+
+def test_fibres_of_cells_with_a_boundary_have_no_images(tmp_path: Path) -> None:
+    """The number stands in the half that the side leaves of the fibre, not at the other side of the cell."""
+    whole = sample(8)
+    header = replace(whole.header, case='{"cell": {"boundary": "displacement"}}')
+    x, y = whole.mesh.points[whole.mesh.triangles].mean(axis=1).T
+    mesh = replace(whole.mesh, body=((x - 1.0) ** 2 + (y - 0.5) ** 2 < 0.25**2).astype(whole.mesh.body.dtype))
+    fibres = replace(whole.fibres, centre=np.array([[1.0, 0.5]]), radius=np.array([0.25]))
+    axes = Figure().subplots()
+    with h5py.File(write(tmp_path, replace(whole, header=header, mesh=mesh, fibres=fibres))) as file:
+        write_fibre_numbers(axes, DrawnCell.of(file), 5.0)
+    ((left, height),) = (text.get_position() for text in axes.texts)
+    assert left == pytest.approx(0.9) and height == pytest.approx(0.5)
