@@ -1,6 +1,6 @@
 """Measures the quality of estimated mesh errors: true error / estimate, on one rank.
 
-    .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--refine N] [--nested]
+    .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--refine N] [--nested] [--least SHARE]
     .venv/bin/python scripts/measure_mesh_error.py --factors [--only WORDS] [--refine N]
 
 Prints, for each cell, order of elements and each of three refinements, the least and the largest ratio over the
@@ -34,6 +34,7 @@ from feti_homog.homogenization.mesh_estimate import energy_errors, factors, is_n
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.uniform_parts import locks
 from feti_homog.homogenization.unit_cell import tear
+from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.system.runtime.standard_streams import Progress
 from feti_homog.typing import Float
 
@@ -163,6 +164,21 @@ def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
     return result.effective_stiffness, result.mesh_error.effective_stiffness
 
 
+def parts(document: dict[str, Any], **mesh: Any) -> Float:
+    """Return the geometric means (k, k) of the estimated |elements| + |arcs| of the diagonal entries."""
+    case = Case.parse(document | {"cell": document["cell"] | mesh})
+    cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
+    context, size = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True)), dict[str, float]()
+    responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)[1]
+    for problem, own in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
+        errors = energy_errors(problem.cell, own)
+        of_loads = np.abs(np.diag(errors.elements)) + np.abs(np.diag(errors.arcs))
+        size |= dict(zip(problem.loads, np.sqrt(of_loads), strict=True))
+    cell.destroy()
+    vector = [size[name] for name in SPATIAL_STRAINS if name in size]
+    return np.outer(vector, vector)
+
+
 def ratios(
     document: dict[str, Any], exact: Float, error: float, order: int, size: float, arguments: argparse.Namespace
 ) -> Float:
@@ -172,6 +188,8 @@ def ratios(
     if arguments.nested:
         estimate = np.abs(solved(document, **mesh, refine=arguments.refine - 1)[0] - found) / (4**order - 1)
     matters = (np.abs(exact) > 1e-3 * np.abs(exact).max()) & (estimate > error)
+    if arguments.least:
+        matters &= np.abs(found - exact) > arguments.least * parts(document, **mesh, refine=arguments.refine)
     return np.asarray(np.abs(found - exact)[matters] / estimate[matters])
 
 
@@ -245,7 +263,7 @@ def print_ratios(arguments: argparse.Namespace) -> None:
         for order in orders(document):
             found = [ratios(document, exact, error, order, size, arguments) for size in SIZES[order]]
             of_all[order] += np.concatenate(found).tolist()
-            words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" for own in found)
+            words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" if len(own) else "no entries" for own in found)
             print(f"{name:26} order {order}: {words}", flush=True)
     for order, own in ((order, np.array(each)) for order, each in of_all.items()):
         shares = ", ".join(f"{np.mean(own > x):.1%} above {x:g}" for x in (5.0, 2.0, 0.5, 0.2))
@@ -258,6 +276,13 @@ def main() -> None:
     parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
     parser.add_argument("--refine", type=int, default=1, help="halvings of coarser meshes; 0 of none")
     parser.add_argument("--nested", action="store_true", help="the solved coarser level in place of recovered stresses")
+    parser.add_argument(
+        "--least",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="only entries whose true error is above this share of its parts, which may cancel",
+    )
     parser.add_argument("--factors", action="store_true", help="of the mesh itself over the mesh refined less")
     arguments = parser.parse_args()
     (print_factors if arguments.factors else print_ratios)(arguments)
