@@ -218,7 +218,9 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 def packed(event: Arrays) -> bytes:
     """Compress an event into the content of a record."""
     layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
-    return zlib.compress(b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())]), 1)
+    content = b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())])
+    compressor = zlib.compressobj(1, strategy=zlib.Z_RLE)  # digits of multipliers have no repetitions to look for
+    return compressor.compress(content) + compressor.flush()
 
 
 def unpacked(content: bytes) -> Arrays:
