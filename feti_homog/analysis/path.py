@@ -55,9 +55,9 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
                 bond = most_utilised_bond(context, law, point)
             entries.append(entry := _entry(context, law, point, responses, work))
             if before is None and point.state.converged:
-                cell, light = context.loads.interfaces, point.broke == 0 < point.softened
+                cell = context.loads.interfaces
                 event = path_events.stored(point, bond, responses, work, cell, _without_lists(entry))
-                context.checkpoint.write(number, *event, light=light)  # softening alone is cheap to compute again
+                context.checkpoint.write(number, *event)
                 line = f"{number + 1} points kept in {context.directory}: --resume goes on, plot and report show them"
                 standard_streams.remarks[:] = [line] * (context.directory is not None)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):

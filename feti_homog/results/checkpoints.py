@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from itertools import count
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -80,13 +81,12 @@ class EventsInMemory:
         """
         return unpacked(self._events[number])
 
-    def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
+    def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays) -> None:
         """Add event `number`; drop former events from this number on.
 
         Args:
             shared: values, equal on all ranks.
             distributed: this rank's parts of distributed arrays.
-            light: whether the event is cheap to compute again, so that a power failure may lose it.
 
         Raises:
             FetiHomogError: the file cannot be written.
@@ -113,6 +113,7 @@ class Checkpoint(EventsInMemory):
         super().__init__(comm, room)
         self.path, self.signature = directory / FOLDER / NAME, signature
         self._ends: list[int] = []  # ends of the records on rank 0; the first record is the signature
+        self._due = -math.inf  # when events must last: a power failure loses a second of them
 
     def clear(self) -> None:
         self._ends = []
@@ -145,7 +146,7 @@ class Checkpoint(EventsInMemory):
         part: Arrays = self.comm.scatter(mpi_errors.on_root_only(self.comm, cut) or [])
         return part
 
-    def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
+    def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays) -> None:
         gathered = {name: self.comm.gather(part) or [] for name, part in distributed.items()}
 
         def append() -> None:
@@ -153,12 +154,12 @@ class Checkpoint(EventsInMemory):
             event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
             event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
             if not self._ends:
-                first = begin(self.signature)
-                atomic.append(self.path, 0, first, False)
+                atomic.append(self.path, 0, first := begin(self.signature), False)
                 self._ends = [len(first)]
             del self._ends[number + 1 :]
             content = record(packed(self._kept(event, self._ends[-1])))
-            atomic.append(self.path, self._ends[-1], content, not light)
+            atomic.append(self.path, self._ends[-1], content, is_due := monotonic() >= self._due)
+            self._due = monotonic() + 1.0 if is_due else self._due
             self._ends.append(self._ends[-1] + len(content))
 
         mpi_errors.on_root(self.comm, append)
@@ -199,8 +200,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                     )
                 place = len(line)
             for number in count():
-                prefix = stream.read(PREFIX.size)
-                if len(prefix) < PREFIX.size:
+                if len(prefix := stream.read(PREFIX.size)) < PREFIX.size:
                     return
                 size, checksum, of_both = PREFIX.unpack(prefix)
                 is_sound = of_both == zlib.crc32(b"%d %d" % (size, checksum))
@@ -218,7 +218,9 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 def packed(event: Arrays) -> bytes:
     """Compress an event into the content of a record."""
     layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
-    return zlib.compress(b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())]), 1)
+    content = b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())])
+    compressor = zlib.compressobj(1, strategy=zlib.Z_RLE)  # digits of multipliers have no repetitions to look for
+    return compressor.compress(content) + compressor.flush()
 
 
 def unpacked(content: bytes) -> Arrays:
@@ -246,8 +248,7 @@ def refuse_others(directory: Path) -> None:
             kind = "link" if folder.is_symlink() else "file"
             raise CaseError(f"--out {directory}: {folder.name} is a {kind} there, and a run makes that folder")
         paths = list(folder.iterdir()) if folder.is_dir() else []
-        foreign = [path.name for path in paths if path.name != NAME or not path.is_file()]
-        if foreign:
+        if foreign := [path.name for path in paths if path.name != NAME or not path.is_file()]:
             raise CaseError(
                 f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
                 f"{folder.name}; move it away or choose another folder"
@@ -271,7 +272,5 @@ def remove(directory: Path) -> None:
 def _remove_events(folder: Path) -> None:
     """Remove the events of a folder as far as possible; the next run removes the rest."""
     with contextlib.suppress(OSError):
-        for path in folder.iterdir():
-            if path.name == NAME:
-                path.unlink()
+        (folder / NAME).unlink(missing_ok=True)
         folder.rmdir()

@@ -65,18 +65,15 @@ def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str 
 
 
 WRITE = "feti_homog.results.checkpoints:Checkpoint.write"
-APPEND = "feti_homog.results.atomic:append"
 COUNT = (
     "os.path.exists('{0}') and "
     "len([*__import__('feti_homog.results.checkpoints', fromlist=['records'])"
     ".records(__import__('pathlib').Path('{0}'))]) - 1"
 )
-# When a path is killed: the last of so many events has just been kept, or the next is written or computed, or so many
-# events have been kept without waiting for the disk.
+# When a path is killed: the last of so many events has just been kept, or the next is written or computed.
 MOMENTS = {
     "kept": lambda _, at: Hook(WRITE, WAIT, when=f"args[1] == {at - 1}", after=True),
     "written": lambda _, at: Hook(WRITE, WAIT, when=f"args[1] == {at}"),
-    "light": lambda _, at: Hook(APPEND, WAIT, when="args[1] and not args[3]", call=at, after=True),
     "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"{COUNT.format(out / 'checkpoint/events')} == {at}"),
 }
 
@@ -134,12 +131,12 @@ def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     case = case_file(tmp_path, **KINDS[kind])
     assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
     softens = kind == "softening"
-    count = killed(ranks, case, tmp_path / "out", 8, moment="light" if softens else "kept")
+    count = killed(ranks, case, tmp_path / "out", 12 if softens else 8)
     job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found, expected = (document(tmp_path / name) for name in ("out", "whole"))
     kept = found["resumed"]
-    assert count == kept < len(expected["path"]) and (count > 8 if softens else count == 8)
+    assert count == kept == (12 if softens else 8) < len(expected["path"])
     assert_same_curve(found["path"], expected["path"])
     if softens:
         assert sum(point["softened"] for point in expected["path"][:kept]) > 0

@@ -45,8 +45,8 @@ def interrupted(at: int = EVENTS, of: str = "") -> Any:
     """End a run, whose folder has `of` in its path, after so many events."""
     write = checkpoints.Checkpoint.write
 
-    def written(self: checkpoints.Checkpoint, number: int, *event: Any, **light: bool) -> None:
-        write(self, number, *event, **light)
+    def written(self: checkpoints.Checkpoint, number: int, *event: Any) -> None:
+        write(self, number, *event)
         if number == at - 1 and of in str(self.path):
             raise RuntimeError("interrupted")
 
