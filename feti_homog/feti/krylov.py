@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.
+H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.  F includes the compliance C of springs.
 
 A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
 iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.
@@ -170,7 +170,7 @@ class Krylov:
         so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
         residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        An exception in a product or the convergence test is raised again if it occurs on all ranks; else the job ends.
+        On several ranks, a FetiHomogError that all ranks raise in a callback is raised again; others end the job.
 
         Returns:
             Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.

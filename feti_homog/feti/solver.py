@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = torn_stiffness E + d^T lam; if `is_pulled`, also -int u* (x) n ds.  Collective."""
+        """Compute |UC| Sigma (v,) = torn_stiffness E + d^T lam, then -int u* (x) n ds (m,) on sides.  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and solution.alpha is not None:
             local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
@@ -198,7 +198,7 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for a load `strain` (v,).  Collective; see `solve_many`."""
+        """Solve the dual problem for a load (v,), from multipliers `start` (owned rows,), like `solve_many`."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
@@ -291,7 +291,7 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """Return the Krylov method for `columns` load cases; the first call sets it up."""
+        """Return the Krylov method for `columns` load cases; the first call sets it up and is collective."""
         if columns not in self._krylov:
             parts = self.jump_operator.vector, self.preconditioner, self.jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)

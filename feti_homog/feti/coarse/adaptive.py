@@ -52,8 +52,8 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Compute the soft modes, and factor the coarse problem.  Collective.
 
-        Soft modes have theta < `threshold`.  Boundary operators must be dense where `operators.facewise` is false.
-        Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
+        Soft modes have eigenvalues theta < `threshold` (`local_eigenproblems`).  Boundary operators must be dense where
+        `operators.facewise` is false.  Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
 
         Raises:
             MeshError: a face neighbourhood on some rank is not a valid subdomain.

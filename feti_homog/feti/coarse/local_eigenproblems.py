@@ -135,6 +135,7 @@ def eigenproblem(
     """Set up the eigenproblem of a subdomain, or of its faces if `block.facewise`.
 
     Raises:
+        MeshError: a face neighbourhood is not a valid subdomain.
         TypeError: the problem is on the whole boundary, but the operators are not dense.
     """
     if block.facewise:
@@ -168,7 +169,7 @@ def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the eigenvectors q (m, j) with P^T S P q = theta P^T N P q, theta < `threshold`.
+    """Compute the eigenvectors q (m, j) with P^T S P q = theta P^T N P q, theta < `threshold`, for the trace space P.
 
     Args:
         S: (m, m) P^T S P, regularised on the kernel of S.

@@ -84,7 +84,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state; return False if a pivot is at most `pivot`.  Collective."""
+        """Update followed columns to the next state; return False, as `FollowedResponse.follow` does.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -124,7 +124,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def _rows_with_pins(self) -> Float:
-        """Return 1 on active rows and on pins (see `followed_response`), else 0: (owned rows,)."""
+        """Mark active rows and pins (see `followed_response`) by 1, other rows by 0: (owned rows,)."""
         holds, pins = self._active.copy(), self._followed.pins - self._first
         holds[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
         return holds
@@ -162,7 +162,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global rows (k,); return False if their asymmetry exceeds `max_error`.  Collective."""
+        """Follow columns at `rows`, and drop none at `needed`; False if asymmetry exceeds `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -173,7 +173,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return the `rows` without columns, and neighbouring active rows without columns.  Collective.
+        """Select the `rows` without columns, and active rows without columns near them.  Collective.
 
         Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
         """
@@ -183,7 +183,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def _are_active(self) -> Bool:
-        """Return whether each row of the cell is active: (all rows,).  Collective."""
+        """Gather the mask (all rows,) of active rows.  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
@@ -208,14 +208,14 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E (owned rows, k) for loads E (v, k); all calls pass the same d (owned rows, v).  Collective."""
+        """Compute H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
-        positions.  Returns None if the number of free motions in the columns differs from `free`.
+        positions.  If the columns do not have `free` free motions, returns None, and follows columns anew.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -229,8 +229,8 @@ class ExactInverse(Preconditioner):
     def renew_answer(self, d: Float) -> Float:
         """Compute the answer U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
-        `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
-        updates, and replaces the stored U.
+        `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
+        rounding from earlier updates, and replaces the stored U.
         """
         changes = self._up_to_date()
         if self._answer is None:
@@ -249,10 +249,10 @@ class ExactInverse(Preconditioner):
         return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
-        """Return columns of H in the reference cell at global rows (k,).  Collective.
+        """Return columns of Gamma, the reference cell's response, at global rows (k,).  Collective.
 
         The columns are (owned rows, k), followed by their entries (k, k) at `rows`.  Before the first `activate`, the
-        reference cell is the bonded cell.
+        reference cell is the bonded cell, and Gamma is H.
         """
         if len(self._unchanged.lacking(rows)):
             missing = self._with_near(rows, self._unchanged)

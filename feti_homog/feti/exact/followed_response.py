@@ -135,7 +135,7 @@ class FollowedResponse:
     def follow(self, rows: Int, signs: Float, gains: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
         """Update U and the columns for changed rows.  Collective.
 
-        Returns False if a scaled pivot is at most `pivot`: digits are lost, and U and Gamma are then useless.
+        Returns False, with U and Gamma useless, if a scaled pivot is at most `pivot` or too many pins become inactive.
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.
@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `_present` returns `values`."""
+        """Subtract `difference` B [Gamma_I:, U_I] from columns (later) and U (now); `values` come from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B

@@ -46,6 +46,7 @@ class AssembledSchur:
 
         Raises:
             TypeError: a boundary operator is not dense.
+            LinAlgError, MemoryError, CaseError: as in `DirectSolver`.
         """
         is_inactive, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
         starts, sizes = jump_operator.node_rows
@@ -179,10 +180,7 @@ class ReferenceCell:
         return self._springs.apply(self._without_springs(x))
 
     def columns(self, rows: Int) -> Float:
-        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,).  Collective.
-
-        All ranks pass the same rows.
-        """
+        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,), equal on all ranks.  Collective."""
         # Batches of about COLUMNS_AT_ONCE: a small last batch would cost more than slightly larger batches.
         columns = [np.zeros((len(self.active), 0))]
         for batch in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:

@@ -206,9 +206,9 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Invert an SPD matrix A (n, n), in Fortran order, in its upper triangle.
+    """Overwrite the upper triangle of an SPD matrix A (n, n), in Fortran order, with the inverse.
 
-    Entries below the diagonal do not change.
+    Entries below the diagonal are not read and do not change.
 
     Raises:
         LinAlgError: A is not positive definite.

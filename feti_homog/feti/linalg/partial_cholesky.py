@@ -160,7 +160,7 @@ class PartialFactor:
         return U
 
     def forward(self, B: Float) -> Float:
-        """Compute L^-1 B (n, k) for B (n, k); rows of the result are in the order of elimination."""
+        """Compute L^-1 B for B (n, k); rows of the result follow `order`, and end with `rows`."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")

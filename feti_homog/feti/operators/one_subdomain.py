@@ -24,7 +24,7 @@ from feti_homog.typing import Float, Int
 class ExplicitInterfaceOperator:
     """S and S+ of one subdomain as dense matrices (n, n) on its n boundary dofs.
 
-    With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
+    With fixing nodes on the boundary, the inverse of S + rho Rf Rf^T (`Subdomain.fixing`) is the boundary part of K+.
 
     Attributes:
         condensed: unit loads on the boundary.
@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T; `dofs` (n,) are ascending.  Options have the prefix `feti_sub_`."""
+        """Factor K + rho Rf Rf^T (prefix `feti_sub_`), or K_ii without boundary and kernel; `dofs` (n,) ascend."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
             # A pinned subdomain without a boundary bears the unit loads alone: solve for their displacements now.
@@ -261,7 +261,7 @@ class Interior:
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
-    """Apply a function to x (n,), or to batches of COLUMNS_AT_ONCE columns of x (n, k)."""
+    """Apply a function to x (n,), or to batches of COLUMNS_AT_ONCE columns of x (n, k), into `out` if given."""
     if out is None:
         out = np.empty_like(x)
     if not len(x):

@@ -84,7 +84,7 @@ class _Softening:
         return np.asarray(self._relaxed(y) - self._root_of_kernel.T @ (self._root_of_kernel @ x))
 
     def matrix(self, S: Float) -> Float:
-        """Compute the symmetric matrix S~ (n, n)."""
+        """Compute the symmetric matrix S~ (n, n) from S (n, n)."""
         A = S + self.stiffness * self.kernel @ self.kernel.T
         G = self._relaxed(A)
         # By symmetry, the differences in columns along the springs are replaced, too.
