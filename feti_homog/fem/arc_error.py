@@ -25,7 +25,7 @@ class ArcSides:
         nodes: (f, p + 1) plane nodes along the side.
         points: (f, p + 1, 2) node positions.
         normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
-        area: (f,) area that the body lacks between the side and the arc.
+        area: (f,) area that the body lacks between the side and the arc, negative for a surplus.
         at_void: (f,) whether a void is on the right.
     """
 

@@ -1,4 +1,4 @@
-"""Assemble the stiffness of a subdomain, its loads by unit strains, averages, and integrals along voids.
+"""Assemble the stiffness and the unit loads of a subdomain; compute element strains and integrals along edges.
 
 Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
 summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
@@ -110,7 +110,7 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate affine coarse triangles on the unit triangle; `mixed` is the stiffness of mixed elements.
+    """Integrate affine coarse triangles `part` (t,) on the unit triangle; `mixed` is the stiffness of mixed elements.
 
     Returns:
         Stiffness blocks (t, p, c^2) of the node couples, integrals (t, q, 2) of the gradients, and the total area.
@@ -225,9 +225,9 @@ def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
 
 
 def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
-    """Integrate N n (classes, 2) along torus edges; n points into the body, so that u^T int N n ds = int grad u.
+    """Integrate N n (classes, 2) along the torus edges in a mask, with n into the body.
 
-    The integral of grad u is over the void beyond the edges.
+    Around a void, u^T int N n ds = int grad u, integrated over the void.
     """
     sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, edges)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC

@@ -165,11 +165,11 @@ class KnownTractions:
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Change the stresses (vertices, m, k) at n vertices to match the known tractions.
+        """Copy the stresses (vertices, m, k), and match the known tractions at vertices `vertex` (n,).
 
         With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
         where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.
-        `voigt` (c, 2) has the component numbers, and the flexibility is (m, m).
+        `voigt` (c, 2) holds strain numbers as in `Problem`, and the flexibility is (m, m).
         """
         n, before = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)
