@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def _for_large_objects(comm: Intracomm) -> Intracomm:
-    """Return the communicator that sends Python objects of any size."""
+    """Wrap the communicator so that it sends Python objects of any size."""
     from mpi4py.util import pkl5  # starts MPI
 
     return pkl5.Intracomm(comm)

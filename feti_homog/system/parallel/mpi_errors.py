@@ -27,8 +27,8 @@ class RemoteError(RuntimeError):
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on rank 0, and return the result on every rank.  Collective.
 
-    An exception on rank 0 is raised on every rank.  Arguments on other ranks are ignored.  The result must be
-    picklable, and `function` must not communicate.
+    An exception on rank 0 is raised on every rank, on other ranks as in `agree`.  Arguments on other ranks are ignored.
+    The result must be picklable, and `function` must not communicate.
     """
     result: T = comm.bcast(on_root_only(comm, function, *args, **kwargs), root=0)
     return result
@@ -46,8 +46,8 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
 
-    `function` must not communicate.  A rank raises its own defect.  Other ranks raise RemoteError for the first
-    rank with a defect or, without defects, the first rank's FetiHomogError (NoMemoryError for a MemoryError).
+    `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
+    A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
 
@@ -102,7 +102,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print an exception of this rank alone, and end the processes of all ranks."""
+    """Print the exception of this rank, and end the processes of all ranks."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
@@ -116,7 +116,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 
 
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
-    """Convert a MemoryError to one line for the user."""
+    """Convert a MemoryError to a NoMemoryError with one line for the user."""
     detail = f": {error}" if str(error) else ""
     hint = "`feti-homog check` estimates the memory of a case, which more ranks share"
     return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")

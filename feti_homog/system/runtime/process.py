@@ -103,9 +103,9 @@ def prefer_own_toolkits() -> None:
 
 
 def ignore_settings_of_the_folder() -> None:
-    """Import Matplotlib without the `matplotlibrc` of the current folder, and draw without windows.
+    """Keep Matplotlib from reading `matplotlibrc` in the current folder and from opening windows.
 
-    Matplotlib would read this file on import, and raise an exception if the file is damaged.
+    Matplotlib reads this file on import, and fails if it is damaged: if it exists, another folder is current meanwhile.
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:
