@@ -78,7 +78,7 @@ class ArcSides:
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
-    """Estimate the error (k, k) in int sigma_i : eps_j from sides that replace arcs.
+    """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.
 
     Diagonal entries are twice the energy error.  The estimate is
 

@@ -31,7 +31,7 @@ class Assembly:
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L; a strain E has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
+        Q: (dofs, v) int B^T L, strains B u*: E has the load -Q E, Eq. (29), and stress integral |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
         areas: (materials,) areas of the materials; their sum is |Omega|.
     """
@@ -225,7 +225,7 @@ def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
 
 
 def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
-    """Integrate N n (classes, 2) along the torus edges in a mask, with n into the body.
+    """Integrate N n (classes, 2) along the torus edges in the mask `edges` (torus edges,), with n into the body.
 
     Around a void, u^T int N n ds = int grad u, integrated over the void.
     """

@@ -1,6 +1,6 @@
 """Fit polynomials to the element values around every vertex, by least squares weighted with areas.
 
-A boundary vertex has elements on one side only, so known tractions correct its fit.
+A fit has p coefficients.  A boundary vertex has elements on one side only, so known tractions correct its fit.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class PatchNeighbours:
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
     """Fit a linear function about every vertex to uniform element values (e, k).
 
-    The fit values (vertices, k) at the vertices are weighted means of element values; only neighbours need sums.
+    Returns the fit values (vertices, k) at the vertices, which are weighted means of element values.
 
     Args:
         vertices: (3, e) vertices of the elements.

@@ -122,7 +122,10 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Superpose solutions on equal active rows by `factors` (k,); alpha is None if any is; see `completed`."""
+        """Superpose k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
+
+        If a solution lacks alpha, so does the result, with iterations and residual of the first solution.
+        """
         triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
         strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
         total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)

@@ -52,7 +52,7 @@ class ProjectedProblem:
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """Project the result of `vectors()` and flatten it; return NaN if `vectors` raises."""
+        """Project the result of `vectors()` and flatten it; return NaN from the first exception on."""
         nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
@@ -170,7 +170,7 @@ class Krylov:
         so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
         residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        On several ranks, a FetiHomogError that all ranks raise in a callback is raised again; others end the job.
+        On several ranks, an exception in a callback ends the job, unless all ranks raise a FetiHomogError.
 
         Returns:
             Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.
@@ -211,7 +211,7 @@ class Krylov:
 
     @property
     def extreme_values(self) -> tuple[float, float] | None:
-        """Return the extreme singular values of P H P F in the last solve, or None without an estimate."""
+        """Return the smallest and largest singular value of P H P F in the last solve; None without an estimate."""
         has_values = self.ksp.getComputeSingularValues() and self.ksp.getType() in ESTIMATES_SINGULAR_VALUES
         if not has_values or self.ksp.getConvergedReason() <= 0 or not self.ksp.getIterationNumber():
             return None

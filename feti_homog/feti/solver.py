@@ -89,7 +89,7 @@ class FetiSolver:
         self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None
         if self.exact_inverse is not None:
-            from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
+            from feti_homog.feti.confirmation import InfluenceSolutions  # only influence columns need it
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self.jumps)
         # The loads of unit strains, and their solutions; without tractions on the sides, the loads are the strains.
@@ -198,7 +198,7 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for a load (v,), from multipliers `start` (owned rows,), like `solve_many`."""
+        """Solve the dual problem for a load (v,) from multipliers `start` (owned rows,), like `solve_many`."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:

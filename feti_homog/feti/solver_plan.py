@@ -277,7 +277,7 @@ def build(
         natural = NaturalCoarseSpace(operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
-        from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # with its eigenproblems
+        from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # only adaptive spaces need it
 
         with PETSc.Log.Event("FETICoarseSetUp"):
             adaptive = AdaptiveCoarseSpace(operators, preconditioner, options.threshold, thresholds)

@@ -137,7 +137,7 @@ class ConstraintLayout:
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def node_rows(self) -> tuple[Int, Int]:
-        """Return the first row, counted among owned rows, and the row count of owned fine nodes, both (nodes,)."""
+        """Return the first row (position among owned rows) and row count of every owned fine node, both (nodes,)."""
         shared = self.shared
         mine = np.flatnonzero(self._is_owned)
         size = self.components * (shared.copies[mine] - 1)
@@ -210,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """List every fine node by its entity and its position p there; `nodes` (e,) are node counts of `entities` (e,)."""
+    """Return the entity and the position p on it for every fine node; `entities` (e,) have `nodes` (e,) fine nodes."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

@@ -86,7 +86,7 @@ class InterfaceNeighbours:
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Find adjacent nodes along interfaces; ValueError if the rows of this rank do not ascend.  Collective."""
+        """Find adjacent nodes along interfaces.  Collective.  Raises ValueError if rows of this rank do not ascend."""
         rows = jump_operator.owned[0] + jump_operator.nodes.row
         if (np.diff(rows) <= 0).any():
             raise ValueError("interface nodes of a rank: expected ascending rows")
@@ -118,9 +118,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) by rows of adjacent nodes to at least `enough` rows, sorted.
+        """Extend global rows (k,) by rows of adjacent nodes, and return at least `enough` rows, sorted.
 
-        `choose` filters the candidates.  The result is shorter where the search meets the ends of all its interfaces.
+        `choose` filters the candidates.  The result has fewer rows if the search has reached all ends of interfaces.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

@@ -114,7 +114,7 @@ class JumpOperator:
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
-        local[rows] = numbers[copies]  # exact, as integers below 2^53 are
+        local[rows] = numbers[copies]  # integers below 2^53 are exact
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:

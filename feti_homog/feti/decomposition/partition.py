@@ -37,7 +37,8 @@ def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
     The strips run along x or y, with about half the triangles each (within STRIP_SLACK), and with the fewest boundary
-    edges of the cuts tried; METIS cuts are up to 50 % longer.  Returns None if a strip without islands is in pieces.
+    edges of the cuts tried; METIS cuts are up to 50 % longer.  Islands of a strip join the other strip.  Returns None
+    if a strip is still not connected.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -120,7 +121,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for at most about `max_dofs` dofs per piece."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs per piece at most."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -131,7 +132,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into `count` parts (n,) of equal `load` (n,), else into connected parts of equal size."""
+    """Divide a graph by METIS into `count` parts (n,) of equal `load` (n,), if None connected parts of equal size."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

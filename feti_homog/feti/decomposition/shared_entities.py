@@ -167,11 +167,11 @@ class SharedEntities(Sharers):
     Attributes:
         nodes: (n,) number of fine nodes on the entity: 1 at a vertex, the inner lattice nodes on an edge.
         first: (n,) number of the first vector constraint.
-        body: (sharers,) body of a sharer.
+        body: (sharers,) body of every sharer.
         fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
         pair: (n,) case interface between both bodies; -1 where no bond can break.
         normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for
-            s in [0, 1]; at a vertex, of the vertex's tributary length.
+            s in [0, 1]; at a vertex, two equal normals of its tributary length.
         turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: half-open range of the vector constraints that this rank owns.

@@ -101,7 +101,7 @@ class Subdomain:
         mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
-        """Assemble K and Q on the refined `mesh`, without communication; arguments and |K R| are as in `build`."""
+        """Assemble K and Q on the refined `mesh`, without communication; raises MeshError for |K R|, like `build`."""
         body = assembly.assemble(mesh, laws, problem, mixed, material)
         shift, closes = mesh_fibres.unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
@@ -168,7 +168,7 @@ class Subdomain:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
         If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to its stiffness, perhaps far above all forces.  Other bodies keep `answers`.
+        adds rounding in proportion to its stiffness, perhaps far above all forces.  Else, the result is `answers`.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -202,9 +202,9 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
+        """Return an elimination order (cn,) of all dofs, or None where the order of a direct solver is cheaper.
 
-        The library's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
+        The direct solver's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
@@ -221,7 +221,7 @@ class Subdomain:
         return K if self._support is None else (K + self._support).tocsr()
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Compute fixing dofs (f,), and a block rho Rf Rf^T (f, f) that makes K definite if added there.
+        """Compute fixing dofs (f,), and a block rho Rf Rf^T (f, f) that makes K definite if added on these dofs.
 
         The inverse of the sum is a generalized inverse K+ of K (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME
         88, 2011).  The dofs belong to one to three nodes of `candidates`, far apart; Rf is the kernel on these dofs,

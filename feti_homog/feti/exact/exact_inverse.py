@@ -35,7 +35,7 @@ class ExactInverse(Preconditioner):
         norm: upper bound of |H|.
         factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns above which unused columns are dropped; read when following starts anew.
+        most_followed: number of columns above which unused columns are dropped; applies from the next reference cell.
     """
 
     is_exact = True
@@ -84,7 +84,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state; return False, as `FollowedResponse.follow` does.  Collective."""
+        """Update followed columns to the next state; return False if `FollowedResponse.follow` fails.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -130,14 +130,14 @@ class ExactInverse(Preconditioner):
         return holds
 
     def _changes(self) -> ReferenceChanges:
-        """Return the changes since the reference cell.  Collective."""
+        """Collect the rows that have changed since the reference cell was factored.  Collective."""
         kinds = np.stack([self.reference.active - self._rows_with_pins, self._more * self._active], axis=1)
         places = np.flatnonzero(kinds.any(axis=1))
         parts = zip(*self.comm.allgather((self._first + places, kinds[places])), strict=True)
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Return the changes since the reference cell, which is renewed after too many changes.  Collective."""
+        """Collect the changed rows, after a new reference cell if there are too many.  Collective."""
         changes = self._changes()
         if len(changes.rows) - self._tie_count <= self._max_changes:
             return changes
@@ -188,7 +188,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def rounding(self) -> float:
-        """Compute the relative rounding error of H.  Collective.
+        """Compute the relative rounding error of the reference cell's H.  Collective.
 
         Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
@@ -215,7 +215,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
-        positions.  If the columns do not have `free` free motions, returns None, and follows columns anew.
+        positions.  Returns None, and restarts old columns, if their number of free motions differs from `free`.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -241,7 +241,7 @@ class ExactInverse(Preconditioner):
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
+        """Compute the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
         All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """

@@ -63,9 +63,9 @@ class FollowedResponse:
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Make room for `more` columns: drop the least recently used columns.
+        """Make room for `more` columns: if necessary, drop the least recently used columns.
 
-        Columns of the rows `needed` are not dropped; columns of `useful` rows (all rows,) are dropped last.
+        Columns of the rows `needed` stay, even above the capacity; columns of `useful` rows (all rows,) go last.
         """
         capacity = len(self._used)
         if len(self._rows) + more <= capacity:

@@ -140,7 +140,7 @@ class BodyTies:
         self._pair = pair[begin : begin + len(nodes.row)]
 
     def tied(self, active: Float) -> Float:
-        """Return `active` (owned rows,) with 1 on the ties of bodies with fewer than two bonds.  Collective."""
+        """Copy `active` (owned rows,), with 1 on the ties of bodies with fewer than two bonds.  Collective."""
         bonded = active[self._rows].prod(axis=1)
         local = np.bincount(self._pair, bonded, len(self._ties)).astype(float)
         bonds = distributed_arrays.allreduce_sum(self._comm, local)
@@ -229,7 +229,7 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs) with B B_D^T = I, moving one body per bond.  Collective.
+    """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
 
     Only the moved body needs forces.  The inner body moves, unless its forces would lose digits because it is more than
     STIFF_FIBRES times as stiff as the outer body.

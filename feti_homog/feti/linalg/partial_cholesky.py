@@ -153,7 +153,7 @@ class PartialFactor:
             block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
             if i.min() < 0 or columns.min() < 0:
                 block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
-            if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # as a rule: one block
+            if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # usually one block
                 U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
             else:
                 U.T[np.ix_(columns, i)] = block

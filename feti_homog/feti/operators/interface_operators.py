@@ -245,7 +245,7 @@ class InterfaceOperators:
         """Extend boundary displacements x (n_s, k) of a subdomain to all its dofs (dofs, k).
 
         Args:
-            place: position of the subdomain.
+            place: position of the subdomain on this rank.
             loads: (v, k) amplitudes of the unit loads; None without loads.
             keep: whether to store the interior, if this call has to factor it.
         """
@@ -274,7 +274,7 @@ class InterfaceOperators:
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
     """Factor one subdomain; return its boundary operator and the diagonal of K on `dofs` (n_s,).
 
-    The subdomain gives up K.  `keep_factor` is as in `ExplicitInterfaceOperator`.
+    The matrix K is taken from the subdomain.  `keep_factor` is as in `ExplicitInterfaceOperator`.
 
     Raises:
         MeshError: rounding leaves K without a factor.

@@ -99,7 +99,7 @@ class StiffnessScaled(Preconditioner):
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """Compute B_D f = W^-1 B D^-1 f (owned rows, k); lam if f = B^T lam with lam on active rows.  Collective."""
+        """Compute B_D f = W^-1 B D^-1 f (owned rows, k): lam if f = B^T lam for lam on active rows.  Collective."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:
@@ -149,7 +149,7 @@ class SpringUpdate:
         self._places, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """Update z = H r, (owned rows,) or (owned rows, k), for the springs; return z itself without springs."""
+        """Update z = H r, (owned rows,) or (owned rows, k), for the springs; z itself without springs.  Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))

@@ -126,7 +126,7 @@ class WithSprings:
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """Compute P^T A P (m, m) for P (n, m), where A is the term of the body times the ratio of S~ to S.
+        """Compute P^T A P (m, m) for P (n, m), with A of the body times the ratio of mean diagonals of S~ and S.
 
         S~ + A is definite, because S and S~ have the same kernel.  The operator must be dense.
         """

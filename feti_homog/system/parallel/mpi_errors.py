@@ -136,7 +136,7 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
 
 
 def _comes(request: Request, timeout: float) -> bool:
-    """Wait at most `timeout` seconds for a request; return whether it is fulfilled."""
+    """Wait at most `timeout` seconds for a request; return whether it has completed."""
     deadline = time.monotonic() + timeout
     while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
         time.sleep(0.001)

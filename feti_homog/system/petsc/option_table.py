@@ -142,7 +142,7 @@ def solver_prefix(name: str) -> str:
 
 
 def help_text() -> str:
-    """Return the help on the solver options, one line per option."""
+    """Return the help on the solver options: a heading, then one line per option."""
     usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
     width = max(map(len, usages))
     lines = [

@@ -60,7 +60,7 @@ def trim_memory(kept: int = 0) -> None:
 
 
 def peak_memory() -> int:
-    """Return the largest resident memory in bytes since `forget_peak`."""
+    """Return the largest resident memory in bytes since the last `forget_peak`, or else since the start."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 

@@ -83,7 +83,7 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
 
     Raises:
         KeyError: a key without a default is missing.
-        TypeError, ValueError: a value has another type, or an array other entries or axes, than the field.
+        TypeError, ValueError: a value has another type than its field, or an array has other axes or entries.
     """
     _require(document, Mapping)
     hints, values = typing.get_type_hints(kind), {}
