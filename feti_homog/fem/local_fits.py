@@ -59,7 +59,7 @@ class PatchNeighbours:
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """Return the weighted neighbour contributions (6, vertices) to linear moments (6, vertices)."""
+        """Return the weighted neighbour contributions (6, vertices) to `moments` of 1, x, y, x^2, x y and y^2."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one

@@ -130,7 +130,7 @@ class RecoveredStress:
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
-        """Compute the uniform stresses in linear elements, with the elements on the last array axis."""
+        """Compute the uniform stresses in linear elements, at the element centres."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
         by_node = self.u.reshape(len(self.u), -1).T.copy()
@@ -202,7 +202,7 @@ class RecoveredStress:
         """Compute the energy of the difference ds between recovered and element stresses.
 
         Returns:
-            int ds_i : S : ds_j (k, k) with the flexibility S, and element shares (e, k) of its diagonal, else (0, k).
+            int ds_i : S : ds_j (k, k), S the flexibility; element shares (e, k) of its diagonal, (0, k) without shares.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]

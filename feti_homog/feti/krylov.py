@@ -52,7 +52,7 @@ class ProjectedProblem:
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """Project the result of `vectors()` and flatten it; return NaN from the first exception on."""
+        """Project the result of `vectors()` and flatten it; return NaN from the first exception on.  Collective."""
         nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 

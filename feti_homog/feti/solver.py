@@ -198,7 +198,7 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for a load (v,) from multipliers `start` (owned rows,), like `solve_many`."""
+        """Solve the dual problem for one load (v,) from `start` (owned rows,), like `solve_many`.  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
@@ -258,10 +258,7 @@ class FetiSolver:
         return solution if solution.alpha is not None else self.jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective.
-
-        Without alpha, the solution must belong to the present state.
-        """
+        """Compute the boundary displacements u* (boundary dofs,), Eq. (34); see `completed`.  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
@@ -273,10 +270,7 @@ class FetiSolver:
         return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """Extend displacements u (boundary dofs, k) into the subdomain at position `place`.
-
-        `loads` and `keep` are as in `InterfaceOperators.extend`, which returns (dofs, k).
-        """
+        """Extend u (boundary dofs, k) to all dofs of the subdomain `place`, by `InterfaceOperators.extend`."""
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 

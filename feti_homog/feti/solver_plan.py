@@ -182,6 +182,7 @@ class SolverParts:
     """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
+        operators, preconditioner, natural: boundary operators; M^-1 or H_0; rigid-body motions, G and P.
         adaptive: coarse space of the preconditioner, or None.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         method: names of preconditioner and coarse space for the summary.

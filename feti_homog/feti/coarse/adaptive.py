@@ -57,7 +57,7 @@ class AdaptiveCoarseSpace:
 
         Raises:
             MeshError: a face neighbourhood on some rank is not a valid subdomain.
-            LinAlgError, CaseError: as in `factor`.
+            LinAlgError, MemoryError, CaseError: as in `factor`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         self.comm, self.threshold = comm, threshold
@@ -118,7 +118,7 @@ class AdaptiveCoarseSpace:
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
-            CaseError: the library in the options cannot factor the matrix on this number of ranks.
+            MemoryError, CaseError: as in `DistributedSolver.factor`.
         """
         self.factorizations += 1
         if not self.coarse_dimension:

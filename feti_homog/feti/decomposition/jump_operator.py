@@ -78,6 +78,7 @@ class JumpOperator:
         lattice: ReferenceLattice,
         problem: Problem = PLANE,
     ) -> None:
+        """Assemble B, and find the interface nodes of this rank.  Collective."""
         self.comm, layout = comm, ConstraintLayout(shared, subdomains, lattice, problem.components)
         self.problem, self.components = problem, layout.components
         self.shared, self._first, self._count = shared, layout.first, layout.count

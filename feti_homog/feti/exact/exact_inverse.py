@@ -47,7 +47,7 @@ class ExactInverse(Preconditioner):
         All boundary operators must be dense.  Options: `feti_influence_columns`.
 
         Raises:
-            CaseError: the value of the option is below 1.
+            CaseError: the value of the option is below 1.  Other exceptions are as in `ReferenceCell`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         is_small = jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
@@ -78,7 +78,7 @@ class ExactInverse(Preconditioner):
         self._next = more
 
     def activate(self, active: Float) -> None:
-        """Restrict H to rows where `active` (owned rows,) is 1.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1; raises like `ReferenceCell`.  Collective."""
         if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED):
             self._active, self._more = active, self._next
             self._restart()
@@ -175,7 +175,7 @@ class ExactInverse(Preconditioner):
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
         """Select the `rows` without columns, and active rows without columns near them.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
+        Neighbours of broken bonds break next, and columns are cheaper together.  If no row is active, none is added.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0

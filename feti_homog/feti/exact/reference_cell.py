@@ -160,7 +160,10 @@ class ReferenceCell:
     """
 
     def __init__(self, operators: InterfaceOperators, one_sided: csr_matrix, active: Float) -> None:
-        """Factor the cell with the active rows A.  Collective; `one_sided` is B_D of `one_sided_jumps`."""
+        """Factor the cell with the active rows A; `one_sided` is B_D of `one_sided_jumps`.  Collective.
+
+        Raises like `AssembledSchur` and `SpringUpdate`.
+        """
         comm, jump_operator = operators.comm, operators.jump_operator
         self._comm, self.active, self._jump_operator, self._operators = comm, active, jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
@@ -191,10 +194,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute the largest |Gamma r| / `stiffness` for jumps r of unit rigid-body motions.  Collective.
-
-        `stiffness` is (owned rows,); without rounding the result is 0.
-        """
+        """Compute the largest rounding |Gamma r| / `stiffness` (owned rows,), r jumps of unit motions.  Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         units = (motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)

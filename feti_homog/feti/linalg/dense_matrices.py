@@ -133,7 +133,7 @@ def _can_be_ordered() -> bool:
 
 
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:
-    """Condense a matrix K and loads Q by the factorization K + D = L L^T.
+    """Condense a matrix K and loads Q by the factorization K + D = L L^T; raises like `schur_complement`.
 
     D > 0 on `rows` makes K + D definite even if K is singular.  With y = L^-1 Q and the block L_bb of L on `rows` b,
     S = L_bb L_bb^T - D, q = L_bb y_b and C = -y_i^T y_i.

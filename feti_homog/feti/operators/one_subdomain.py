@@ -39,7 +39,7 @@ class ExplicitInterfaceOperator:
         Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
-            LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
+            LinAlgError, MemoryError: as in `schur_complement`, or S is not positive definite off its kernel.
         """
         from feti_homog.feti.linalg import dense_matrices  # sparse operators do not need it
 
@@ -162,7 +162,10 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T (prefix `feti_sub_`), or K_ii without boundary and kernel; `dofs` (n,) ascend."""
+        """Factor K + rho Rf Rf^T, or K_ii if the subdomain is pinned and has no boundary; `dofs` (n,) are ascending.
+
+        Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
+        """
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
             # A pinned subdomain without a boundary bears the unit loads alone: solve for their displacements now.
@@ -219,7 +222,7 @@ class Interior:
     answers: Float | None = None
 
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
-        """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).
+        """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).  Raises like `DirectSolver`.
 
         Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for CHOLMOD's.
         """

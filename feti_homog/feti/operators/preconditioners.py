@@ -174,7 +174,7 @@ class SpringUpdated(Preconditioner):
     """A preconditioner H with `SpringUpdate` for the springs of active rows, which may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
-        """Update H = `inner` with all rows active; `first` and `compliance` as in `SpringUpdate`.  Collective."""
+        """Update H = `inner` with all rows active; arguments and exceptions as in `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._intact_compliance = self._compliance = compliance
         self.is_exact, self.norm = inner.is_exact, inner.norm  # springs only reduce |H|
@@ -185,7 +185,7 @@ class SpringUpdated(Preconditioner):
         self._compliance = self._intact_compliance + more
 
     def activate(self, active: Float) -> None:
-        """Restrict H to rows where `active` (owned rows,) is 1, and update it.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1, and update it; raises like both.  Collective."""
         self._inner.activate(active)
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 

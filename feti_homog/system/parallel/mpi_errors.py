@@ -63,7 +63,7 @@ def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
 
 
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Call a function that communicates, such as a collective call of a library.  Collective.
+    """Call a function that communicates, such as a library's collective function; return its result.  Collective.
 
     If a rank raises a FetiHomogError, every rank raises.  A rank raises other exceptions alone, because the other ranks
     may wait for it within `function`: the caller must end the job.  The job also ends if the other ranks do not return
@@ -161,7 +161,7 @@ def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T |
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:
-    """Convert an exception for other ranks: a defect becomes its traceback, as it may not be picklable."""
+    """Convert an exception (or None) for other ranks: a defect becomes its traceback, as it may not be picklable."""
     if error is None or isinstance(error, FetiHomogError):
         return error
     if isinstance(error, MemoryError):
