@@ -173,7 +173,7 @@ class MacroElement:
         couples: rule that sums the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: rule that sums the values at the element nodes (4**refine, a) to the q lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) sums over elements of products of second derivatives (`MixedElements`); 0 if linear.
+        hessians: (p, 9) sums over elements of products of second derivatives (`affine_couples`); 0 if linear.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 

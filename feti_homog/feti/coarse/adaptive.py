@@ -187,7 +187,7 @@ class Balanced(Preconditioner):
         self.scaled, self.coarse = scaled, coarse
 
     def activate(self, active: Float) -> None:
-        """Restrict scaling and coarse space to rows where `active` (owned rows,) is 1.  Collective."""
+        """Restrict both parts to rows where `active` (owned rows,) is 1; raises like `coarse.activate`.  Collective."""
         self.scaled.activate(active)
         self.coarse.activate(active)
 

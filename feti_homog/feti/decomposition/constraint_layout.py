@@ -95,8 +95,8 @@ class ConstraintLayout:
         component, identity = np.arange(c), np.eye(c)
         none = np.zeros(0, np.int64)
         rows, columns, values = [none], [none], [none.astype(float)]
-        # Entities with equal codes form a group: their bodies have equal numbers of copies, and their bonds all can or
-        # all cannot break.  Bits mark the first copy of every body, the end of the copies, and breakable bonds.
+        # Entities with equal codes form a group: their bodies have equal numbers of copies, and all or none of their
+        # bonds can break.  Bits mark the first copy of every body, the end of the copies, and breakable bonds.
         entity, copy = expand(np.arange(len(shared.key)), shared.copies)
         codes = np.zeros((len(shared.key), shared.copies.max(initial=0) + 2), bool)
         codes[entity, copy] = (copy == 0) | (np.diff(shared.body, prepend=-1) != 0)

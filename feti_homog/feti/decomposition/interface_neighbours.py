@@ -118,9 +118,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) by rows of adjacent nodes, and return at least `enough` rows, sorted.
+        """Extend global rows (k,) by rows of adjacent nodes until there are `enough`, and return all rows, sorted.
 
-        `choose` filters the candidates.  The result has fewer rows if the search has reached all ends of interfaces.
+        `choose` filters the candidates.  The search also ends where it finds no further adjacent node.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

@@ -107,7 +107,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles: cut the largest pieces until there are `count`."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles: cut the largest pieces, up to `count` in all."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -132,7 +132,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into `count` parts (n,) of equal `load` (n,), if None connected parts of equal size."""
+    """Divide a graph by METIS into `count` parts (n,) of about equal `load` (n,); if None, parts are connected."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

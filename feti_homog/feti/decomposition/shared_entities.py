@@ -124,7 +124,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
     """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
-    Edges (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), which are entities or the pinned class.
+    Edges with keys `edge` (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), entities or pinned.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]
@@ -149,7 +149,7 @@ def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
     turn = mesh.turns[plane]
     tangents = np.repeat((b - a)[:, None], 2, axis=1)
     curved = turn > 0
-    # On an arc about c the place y obeys y'' = -turn^2 y.
+    # On an arc, the vector y from the centre obeys y'' = -turn^2 y.
     angle, centre = turn[curved, None], mesh.circles[plane[curved], :2]
     start, stop = a[curved] - centre, b[curved] - centre
     slopes = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)

@@ -194,7 +194,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute the largest rounding |Gamma r| / `stiffness` (owned rows,), r jumps of unit motions.  Collective."""
+        """Compute max |Gamma r| / `stiffness` (owned rows,) for jumps r of unit rigid-body motions.  Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         units = (motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)
@@ -244,7 +244,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     weights = B.data[mine] ** 2
     terms = weights * operators.diagonal[B.col[mine]], weights
     sums = [np.bincount(side[mine], values, side_count) for values in terms]
-    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # integers without bonds
+    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # integers if no bonds
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
     moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])

@@ -185,7 +185,7 @@ class SpringUpdated(Preconditioner):
         self._compliance = self._intact_compliance + more
 
     def activate(self, active: Float) -> None:
-        """Restrict H to rows where `active` (owned rows,) is 1, and update it; raises like both.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1, and update it, like `SpringUpdate`.  Collective."""
         self._inner.activate(active)
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 

@@ -144,7 +144,7 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _lines(error: FetiHomogError) -> str:
-    """Return one line for every fault."""
+    """Return the faults as lines that begin with "error: "."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 

@@ -109,9 +109,9 @@ class _Identity:
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     """Return the faults of options with which PETSc's solvers cannot be made.
 
-    `options` has the names without dash and the values in the database.  Every solver is made for a 1 x 1 matrix and
-    applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
-    options with -help.  Options that print are removed meanwhile.
+    `options` has the names without dash and the values in the database.  Every solver with options (with -help, every
+    solver) is made for a 1 x 1 matrix and applied once, because some methods fail only then.  PETSc marks the options
+    that it reads, and prints all readable options with -help.  Options that print are removed meanwhile.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:
