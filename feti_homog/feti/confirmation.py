@@ -15,7 +15,7 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """A dual solver that multiplies by influence columns H, and confirms only some solutions by F lambda.
+    """A dual solver by influence columns H, which confirms only some solutions by F lambda.
 
     If a solve with F lambda confirms the n solves before it, the next min(2 n + 1, MOST_UNCONFIRMED) solves skip
     F lambda: this number is the quota.

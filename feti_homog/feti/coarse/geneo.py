@@ -154,7 +154,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Cut the columns `span` out of a matrix, at the sorted `rows` that contain all nonzeros of these columns."""
+    """Cut the columns `span` out of a matrix; `rows` are sorted, and contain all nonzeros of these columns."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

@@ -126,7 +126,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x, (owned rows,) or (owned rows, k), which is 0 on inactive rows.  Collective."""
+        """Compute P x for x (owned rows,) or (owned rows, k), with 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:

@@ -27,8 +27,8 @@ SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POIN
 def along(ends: Float, turn: Float, place: Float) -> Float:
     """Interpolate y (k, 2) at s = `place` (k,) in [0, 1] from its values `ends` (k, 2, 2) at s = 0 and s = 1.
 
-    y is dx / ds, or a normal of the same length.  On an arc of an ellipse, over which the parametric angle grows by
-    `turn` (k,), y'' = -turn^2 y; on straight edges `turn` is 0, and y is linear.
+    y is dx / ds, or a normal with the length |dx / ds|.  On an arc of an ellipse, with the increment `turn` (k,) of the
+    parametric angle, y'' = -turn^2 y; on straight edges `turn` is 0, and y is linear.
     """
     sine = np.where(turn > 0, np.sin(turn), 1.0)
     of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine

@@ -202,7 +202,7 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """Return an elimination order (cn,) of all dofs, or None where the order of a direct solver is cheaper.
+        """Return an elimination order (cn,) of all dofs, or None if the direct solver should choose.
 
         The direct solver's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
         """
@@ -221,7 +221,7 @@ class Subdomain:
         return K if self._support is None else (K + self._support).tocsr()
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Compute fixing dofs (f,), and a block rho Rf Rf^T (f, f) that makes K definite if added on these dofs.
+        """Compute fixing dofs (f,), and the term rho Rf Rf^T (f, f) on these dofs: K plus the term is definite.
 
         The inverse of the sum is a generalized inverse K+ of K (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME
         88, 2011).  The dofs belong to one to three nodes of `candidates`, far apart; Rf is the kernel on these dofs,
@@ -267,7 +267,7 @@ def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Floa
 
 
 def label(submesh: Submesh) -> str:
-    """Name a subdomain in messages by number, phase and a point."""
+    """Return the name of a subdomain in messages: number, phase and a point."""
     x, y = submesh.points[0] + submesh.origin
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"

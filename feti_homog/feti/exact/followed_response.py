@@ -36,7 +36,7 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows of pins, which hold bodies that no active row holds.
-        had_pins: whether a body has been free; U then loses digits with every change of that body's few faces.
+        had_pins: whether a body has been free; U then loses digits at every change on the interface of that body.
     """
 
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
@@ -251,8 +251,8 @@ class FollowedResponse:
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
     """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
 
-    Rows can always become active (sign -1); rows can become inactive (1) as long as no body becomes free.  The result
-    is None if a scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1); rows can become inactive (1) if no body becomes free.  The result is None
+    if a scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))

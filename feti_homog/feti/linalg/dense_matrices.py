@@ -232,7 +232,7 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
-    """Copy the lower triangle of A (n, n) to a symmetric matrix (n, n), in C order, by blocks that fit the cache."""
+    """Copy the lower triangle of A (n, n) to a symmetric matrix in C order; blocks of `block` rows fit the cache."""
     full, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
         rows = slice(j, j + block)

@@ -213,7 +213,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Sort the indices of a sparse matrix, and return a PETSc matrix on this rank that shares its arrays."""
+    """Return a PETSc matrix on this rank that shares the arrays of a sparse matrix; its indices are sorted first."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

@@ -34,7 +34,7 @@ class ExplicitInterfaceOperator:
     is_dense = True
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
-        """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), which are ascending.
+        """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), in ascending order.
 
         Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
@@ -86,7 +86,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix with `diagonal` (n,) and one triangle of the array, lower or upper.
+        """Multiply x by a symmetric matrix: `diagonal` (n,), and the lower or upper triangle of the array.
 
         A product is fastest for x in Fortran order.
         """
@@ -147,7 +147,7 @@ class CondensedLoads:
     Attributes:
         boundary: (n, v) q.
         stiffness: (v, v) C, or its sum over subdomains.
-        energy: (v, v) twice the energy at u_b = 0, which is C.  A subdomain without a boundary has
+        energy: (v, v) twice the energy at u_b = 0, equal to C.  A subdomain without a boundary has
             |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which is C only if u_i is exact.
     """
 

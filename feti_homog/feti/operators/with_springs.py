@@ -126,7 +126,7 @@ class WithSprings:
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """Compute P^T A P (m, m) for P (n, m), with A of the body times the ratio of mean diagonals of S~ and S.
+        """Compute P^T A P (m, m) for P (n, m); A is the body's A, scaled from the size of S to S~.
 
         S~ + A is definite, because S and S~ have the same kernel.  The operator must be dense.
         """

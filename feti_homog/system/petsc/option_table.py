@@ -100,7 +100,7 @@ CLOSE = 0.9
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """Return one fault for every name (without dash) that is unknown or misspelt, or an option unfit for batch runs."""
+    """Return one fault for every name (without dash) that is unknown, misspelt or unfit for batch runs."""
     faults = []
     for name in names:
         hint = ""

@@ -72,7 +72,7 @@ def without_iterations() -> str:
 
 
 def refuse_unused() -> None:
-    """Refuse options with the prefix `feti_` that no solver has read, after the set-up of all solvers.
+    """Refuse `feti_` options that no solver has read; call this after the set-up of all solvers.
 
     Options in the table are accepted, because a run may make their solvers later or not at all.
 
