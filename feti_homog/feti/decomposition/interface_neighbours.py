@@ -118,7 +118,7 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) by rows of adjacent nodes to `enough` rows; return all rows, sorted.
+        """Extend global rows (k,) by rows of adjacent nodes to at least `enough` rows; return all rows, sorted.
 
         `choose` filters the candidates.  The search also ends where it finds no further adjacent node.
         """

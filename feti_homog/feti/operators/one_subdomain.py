@@ -224,7 +224,7 @@ class Interior:
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
         """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).  Raises like `DirectSolver`.
 
-        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for CHOLMOD's.
+        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for the solver's.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False
