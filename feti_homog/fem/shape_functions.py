@@ -222,7 +222,7 @@ def voigt(gradient: Float) -> Float:
 def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
     """Compute the energy rate of elements whose nodes and displacements change.
 
-    With nodes at x + s dx and displacements u + s du, the rate d/ds sum_e int W at s = 0 is
+    With nodes at x + s dx, displacements u + s du and energy density W, the rate d/ds sum_e int W at s = 0 is
 
         int sigma : (grad du - grad u grad dx) + W div dx,
 

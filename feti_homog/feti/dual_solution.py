@@ -21,7 +21,7 @@ class DualSolution:
 
     Attributes:
         strain: (v,) load E: the macroscopic strain, then the other loads of the problem; with tractions on the sides
-            (v + m,), followed by Sigma.
+            (v + m,), followed by the stress Sigma of the tractions.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
@@ -155,8 +155,8 @@ class ActiveJumps:
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
-    For displacements u = K+ f (boundary dofs, v), the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps
-    under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far under such forces.
+    For u = K+ f (boundary dofs, v) and the machine precision eps, the estimate is B K+ (eps diag(K) |u|) with random
+    signs: jumps under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far under them.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

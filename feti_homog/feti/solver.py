@@ -54,7 +54,7 @@ class FetiSolver:
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.
-        condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
+        condition: largest estimated condition number of the preconditioned operator so far; 0 without iterations.
         method: names of preconditioner and coarse space for the summary.
     """
 

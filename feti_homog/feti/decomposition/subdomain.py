@@ -27,7 +27,7 @@ class Subdomain:
         problem: components of the displacement, and unit loads.
         L: (v, v) stiffness of the material, see `assemble`; with several materials, the mean over the area.
         laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
-        Q: (cn, v) unit loads, forces f = -Q E; with given tractions on the sides (cn, v + m), f = -Q [E, Sigma].
+        Q: (cn, v) unit loads, forces f = -Q E; with tractions t = Sigma n on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
         areas: (materials,) area of every material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,

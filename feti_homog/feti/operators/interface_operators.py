@@ -58,8 +58,8 @@ def choose(
     Returns two lists with a flag for every subdomain: whether it gets dense matrices instead of sparse factors, and
     whether it is facewise: its soft modes are computed face by face.
 
-    By default a subdomain with n <= `dense_boundary_dofs` gets dense matrices if the inverse takes no longer than all
-    products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
+    By default a subdomain with n <= `dense_boundary_dofs` boundary dofs gets dense matrices if the inverse costs less
+    than all sparse solves (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
     modes need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
 
     Args:
