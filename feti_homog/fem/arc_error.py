@@ -25,7 +25,7 @@ class ArcSides:
         nodes: (f, p + 1) plane nodes along the side.
         points: (f, p + 1, 2) node positions.
         normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
-        area: (f,) area that the body lacks between the side and the arc.
+        area: (f,) area that the body lacks between the side and the arc, negative for a surplus.
         at_void: (f,) whether a void is on the right.
     """
 
@@ -78,7 +78,7 @@ class ArcSides:
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
-    """Estimate the error (k, k) in int sigma_i : eps_j from sides that replace arcs.
+    """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.
 
     Diagonal entries are twice the energy error.  The estimate is
 

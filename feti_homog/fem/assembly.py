@@ -1,4 +1,4 @@
-"""Assemble the stiffness of a subdomain, its loads by unit strains, averages, and integrals along voids.
+"""Assemble the stiffness and the unit loads of a subdomain; compute element strains and integrals along edges.
 
 Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
 summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
@@ -31,7 +31,7 @@ class Assembly:
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L; a strain E has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
+        Q: (dofs, v) int B^T L, strains B u*: E has the load -Q E, Eq. (29), and stress integral |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
         areas: (materials,) areas of the materials; their sum is |Omega|.
     """
@@ -110,7 +110,7 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate affine coarse triangles on the unit triangle; `mixed` is the stiffness of mixed elements.
+    """Integrate affine coarse triangles `part` (t,) on the unit triangle; `mixed` is the stiffness of mixed elements.
 
     Returns:
         Stiffness blocks (t, p, c^2) of the node couples, integrals (t, q, 2) of the gradients, and the total area.
@@ -173,7 +173,7 @@ class MacroElement:
         couples: rule that sums the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: rule that sums the values at the element nodes (4**refine, a) to the q lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
-        hessians: (p, 9) sums over elements of products of second derivatives (`MixedElements`); 0 if linear.
+        hessians: (p, 9) sums over elements of products of second derivatives (`affine_couples`); 0 if linear.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 
@@ -225,9 +225,9 @@ def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
 
 
 def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
-    """Integrate N n (classes, 2) along torus edges; n points into the body, so that u^T int N n ds = int grad u.
+    """Integrate N n (classes, 2) along the torus edges in the mask `edges` (torus edges,), with n into the body.
 
-    The integral of grad u is over the void beyond the edges.
+    Around a void, u^T int N n ds = int grad u, integrated over the void.
     """
     sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, edges)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC

@@ -1,6 +1,6 @@
 """Fit polynomials to the element values around every vertex, by least squares weighted with areas.
 
-A boundary vertex has elements on one side only, so known tractions correct its fit.
+A fit has p coefficients.  A boundary vertex has elements on one side only, so known tractions correct its fit.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class PatchNeighbours:
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """Return the weighted neighbour contributions (6, vertices) to linear moments (6, vertices)."""
+        """Return the weighted neighbour contributions (6, vertices) to `moments` of 1, x, y, x^2, x y and y^2."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -76,7 +76,7 @@ class PatchNeighbours:
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
     """Fit a linear function about every vertex to uniform element values (e, k).
 
-    The fit values (vertices, k) at the vertices are weighted means of element values; only neighbours need sums.
+    Returns the fit values (vertices, k) at the vertices, which are weighted means of element values.
 
     Args:
         vertices: (3, e) vertices of the elements.
@@ -165,11 +165,11 @@ class KnownTractions:
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Change the stresses (vertices, m, k) at n vertices to match the known tractions.
+        """Copy the stresses (vertices, m, k), and match the known tractions at vertices `vertex` (n,).
 
         With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
         where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.
-        `voigt` (c, 2) has the component numbers, and the flexibility is (m, m).
+        `voigt` (c, 2) holds strain numbers as in `Problem`, and the flexibility is (m, m).
         """
         n, before = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)

@@ -129,7 +129,7 @@ class MixedElements:
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
-        """Compute the nodal stiffness (e, 6, 6, 4), with (i, j) flat."""
+        """Compute the nodal stiffness (e, 6, 6, 4) without bubble and pressure, with (i, j) flat."""
         K, n = self._stiffness(slice(None)), 2 * BUBBLE
         nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
@@ -222,7 +222,7 @@ def voigt(gradient: Float) -> Float:
 def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
     """Compute the energy rate of elements whose nodes and displacements change.
 
-    With nodes at x + s dx and displacements u + s du, the rate d/ds sum_e int W at s = 0 is
+    With nodes at x + s dx, displacements u + s du and energy density W, the rate d/ds sum_e int W at s = 0 is
 
         int sigma : (grad du - grad u grad dx) + W div dx,
 

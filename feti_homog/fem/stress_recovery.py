@@ -50,7 +50,7 @@ class RecoveredStress:
         loads: (v, k) macroscopic strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure.
         known: tractions that the recovered stresses in linear elements obey.
-        shared: vertex classes (n,) and fits (n, p, m k) that include the elements of other pieces of the body.
+        shared: vertex classes (s,), and fits (s, p, m k) that include the elements of other pieces of the body.
     """
 
     points: Float
@@ -78,7 +78,7 @@ class RecoveredStress:
 
     @cached_property
     def _rows(self) -> Int:
-        """Return the plane element vertices (3, e)."""
+        """Return the plane nodes (3, e) at the element vertices."""
         return np.ascontiguousarray(self.triangles[:, :3].T, np.int64)
 
     @cached_property
@@ -93,7 +93,7 @@ class RecoveredStress:
 
     @cached_property
     def numbers(self) -> Int:
-        """Return the vertex numbers (classes,), counted from 0 over the vertex classes."""
+        """Return the vertex numbers (classes,), counted from 0 over vertex classes; meaningless on other classes."""
         is_vertex = np.zeros(len(self.u), bool)
         is_vertex[self.node_class[self.triangles[:, :3]]] = True
         return np.asarray(np.cumsum(is_vertex) - 1)
@@ -130,7 +130,7 @@ class RecoveredStress:
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
-        """Compute the uniform stresses in linear elements, with the elements on the last array axis."""
+        """Compute the uniform stresses in linear elements, at the element centres."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
         (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
         by_node = self.u.reshape(len(self.u), -1).T.copy()
@@ -181,7 +181,7 @@ class RecoveredStress:
         return moments, sums
 
     def _with_shared(self, fits: Float) -> Float:
-        """Replace the fits (vertices, p, m k) at shared vertices by the shared fits."""
+        """Replace the fits (vertices, p, m k) at shared vertices by the shared fits, in place."""
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
@@ -202,7 +202,7 @@ class RecoveredStress:
         """Compute the energy of the difference ds between recovered and element stresses.
 
         Returns:
-            int ds_i : S : ds_j (k, k), and the element contributions (e, k) to its diagonal, (0, k) without shares.
+            int ds_i : S : ds_j (k, k), S the flexibility; element shares (e, k) of its diagonal, (0, k) without shares.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]

@@ -15,7 +15,7 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """A dual solver that multiplies by influence columns H, and confirms only some solutions by F lambda.
+    """A dual solver by influence columns H, which confirms only some solutions by F lambda.
 
     If a solve with F lambda confirms the n solves before it, the next min(2 n + 1, MOST_UNCONFIRMED) solves skip
     F lambda: this number is the quota.
@@ -106,7 +106,7 @@ class InfluenceSolutions:
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([active.T @ active, d.T @ d]))
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
-        """Compute the errors of predicted multipliers and of predicted jumps.  Collective.
+        """Compute the largest errors of predicted multipliers and of predicted jumps.  Collective.
 
         For every load, errors are relative to the largest entry in `lam` and in `opening`, both (owned rows, k).  Jumps
         count only if no body is free to move.  Multipliers may cancel, for example where bonds are pressed, so the

@@ -21,7 +21,7 @@ class DualSolution:
 
     Attributes:
         strain: (v,) load E: the macroscopic strain, then the other loads of the problem; with tractions on the sides
-            (v + m,), followed by Sigma.
+            (v + m,), followed by the stress Sigma of the tractions.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
@@ -122,7 +122,10 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Superpose solutions with equal active rows, weighted by `factors`; `d` is as in `completed`."""
+        """Superpose k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
+
+        If a solution lacks alpha, so does the result, with iterations and residual of the first solution.
+        """
         triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
         strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
         total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
@@ -152,8 +155,8 @@ class ActiveJumps:
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
-    For displacements u = K+ f (boundary dofs, v), the estimate is B K+ (eps diag(K) |u|) with random signs: the jumps
-    under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far under such forces.
+    For u = K+ f (boundary dofs, v) and the machine precision eps, the estimate is B K+ (eps diag(K) |u|) with random
+    signs: jumps under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far then.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

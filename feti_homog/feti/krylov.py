@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.
+H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.  F includes the compliance C of springs.
 
 A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
 iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.
@@ -52,7 +52,7 @@ class ProjectedProblem:
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """Project the result of `vectors()` and flatten it; return NaN if `vectors` raises."""
+        """Project the result of `vectors()` and flatten it; return NaN from the first exception on.  Collective."""
         nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
@@ -170,7 +170,7 @@ class Krylov:
         so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
         residual computed anew; after MAX_RESTARTS restarts, the iteration continues through a stall.
 
-        An exception in a product or the convergence test is raised again if it occurs on all ranks; else the job ends.
+        On several ranks, an exception in a callback ends the job, unless all ranks raise a FetiHomogError.
 
         Returns:
             Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.
@@ -211,7 +211,7 @@ class Krylov:
 
     @property
     def extreme_values(self) -> tuple[float, float] | None:
-        """Return the extreme singular values of P H P F in the last solve, or None without an estimate."""
+        """Return the smallest and largest singular value of P H P F in the last solve; None without an estimate."""
         has_values = self.ksp.getComputeSingularValues() and self.ksp.getType() in ESTIMATES_SINGULAR_VALUES
         if not has_values or self.ksp.getConvergedReason() <= 0 or not self.ksp.getIterationNumber():
             return None

@@ -54,7 +54,7 @@ class FetiSolver:
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.
-        condition: largest condition number of P H P F so far, estimated by the iterations; 0 without iterations.
+        condition: largest estimated condition number of the preconditioned operator so far; 0 without iterations.
         method: names of preconditioner and coarse space for the summary.
     """
 
@@ -89,7 +89,7 @@ class FetiSolver:
         self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None
         if self.exact_inverse is not None:
-            from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
+            from feti_homog.feti.confirmation import InfluenceSolutions  # only influence columns need it
 
             self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self.jumps)
         # The loads of unit strains, and their solutions; without tractions on the sides, the loads are the strains.
@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma = torn_stiffness E + d^T lam; if `is_pulled`, also -int u* (x) n ds.  Collective."""
+        """Compute |UC| Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and solution.alpha is not None:
             local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
@@ -198,7 +198,7 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for a load `strain` (v,).  Collective; see `solve_many`."""
+        """Solve the dual problem for one load (v,) from `start` (owned rows,), like `solve_many`.  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
@@ -258,10 +258,7 @@ class FetiSolver:
         return solution if solution.alpha is not None else self.jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective.
-
-        Without alpha, the solution must belong to the present state.
-        """
+        """Compute the boundary displacements u* (boundary dofs,), Eq. (34); see `completed`.  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
@@ -273,10 +270,7 @@ class FetiSolver:
         return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """Extend displacements u (boundary dofs, k) into the subdomain at position `place`.
-
-        `loads` and `keep` are as in `InterfaceOperators.extend`, which returns (dofs, k).
-        """
+        """Extend u (boundary dofs, k) to all dofs of the subdomain `place`, by `InterfaceOperators.extend`."""
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 
@@ -291,7 +285,7 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """Return the Krylov method for `columns` load cases; the first call sets it up."""
+        """Return the Krylov method for `columns` load cases; the first call sets it up and is collective."""
         if columns not in self._krylov:
             parts = self.jump_operator.vector, self.preconditioner, self.jumps, columns
             self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)

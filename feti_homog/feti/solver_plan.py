@@ -44,7 +44,7 @@ class SolverOptions:
 
     Attributes:
         preconditioner: `-feti_pc_type`, one of PRECONDITIONERS.
-        operator: `-feti_dual_operator`, one of KINDS.
+        operator: `-feti_dual_operator`, one of KINDS; by default explicit with `-feti_pc_type influence`.
         coarse_space: `-feti_coarse_space`, one of COARSE_SPACES.
         threshold: `-feti_coarse_threshold`, the bound tau of soft modes.
     """
@@ -136,6 +136,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     If all operators are dense, and no option requests the adaptive space, the default is influence columns for a thin
     body, or for at least `influence_applications` products and at most `assembled_schur_dofs` shared dofs; else, if no
     option requests a coarse space, BONDED for `one_each` and 1 to `dense_boundary_dofs` shared dofs; else "dirichlet".
+    With "dirichlet", the coarse space is adaptive on request, or if bodies are cut and all subdomains are searchable.
 
     Raises:
         CaseError: two options exclude each other.
@@ -182,6 +183,7 @@ class SolverParts:
     """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
+        operators, preconditioner, natural: boundary operators; M^-1 or H_0; rigid-body motions, G and P.
         adaptive: coarse space of the preconditioner, or None.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         method: names of preconditioner and coarse space for the summary.
@@ -277,7 +279,7 @@ def build(
         natural = NaturalCoarseSpace(operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
-        from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # with its eigenproblems
+        from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # only adaptive spaces need it
 
         with PETSc.Log.Event("FETICoarseSetUp"):
             adaptive = AdaptiveCoarseSpace(operators, preconditioner, options.threshold, thresholds)

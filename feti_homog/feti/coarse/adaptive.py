@@ -4,9 +4,9 @@ After elimination of the coarse displacements Z_0 (`geneo.AveragedModes`), the b
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-and the preconditioner is H_0 = B_D S_0 B_D^T.  As B Z_0 = 0, H_0 is the exact inverse of the dual operator if Z_0 spans
-all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes them from the Krylov method
-(Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite; it couples all neighbours of a subdomain.
+and the preconditioner is H_0 = B_D S_0 B_D^T, B_D = W^-1 B D^-1.  As B Z_0 = 0, H_0 is the inverse of the dual operator
+if Z_0 spans all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes them from the Krylov
+method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite; it couples a subdomain's neighbours.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Compute the soft modes, and factor the coarse problem.  Collective.
 
-        Soft modes have theta < `threshold`.  Boundary operators must be dense where `operators.facewise` is false.
-        Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
+        Soft modes have eigenvalues theta < `threshold` (`local_eigenproblems`).  Boundary operators must be dense where
+        `operators.facewise` is false.  Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
 
         Raises:
             MeshError: a face neighbourhood on some rank is not a valid subdomain.
-            LinAlgError, CaseError: as in `factor`.
+            LinAlgError, MemoryError, CaseError: as in `factor`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         self.comm, self.threshold = comm, threshold
@@ -118,7 +118,7 @@ class AdaptiveCoarseSpace:
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
-            CaseError: the library in the options cannot factor the matrix on this number of ranks.
+            MemoryError, CaseError: as in `DistributedSolver.factor`.
         """
         self.factorizations += 1
         if not self.coarse_dimension:
@@ -187,7 +187,7 @@ class Balanced(Preconditioner):
         self.scaled, self.coarse = scaled, coarse
 
     def activate(self, active: Float) -> None:
-        """Restrict scaling and coarse space to rows where `active` (owned rows,) is 1.  Collective."""
+        """Restrict both parts to rows where `active` (owned rows,) is 1; raises like `coarse.activate`.  Collective."""
         self.scaled.activate(active)
         self.coarse.activate(active)
 

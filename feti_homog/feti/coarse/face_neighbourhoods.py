@@ -1,6 +1,6 @@
 """Face neighbourhoods of large bodies, and trace spaces of piecewise linear displacements.
 
-For given face displacements p, the body stores at least as much energy as the face neighbourhood N:
+For given face displacements p, the body stores no less energy than the face neighbourhood N:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
@@ -109,7 +109,7 @@ def face_neighbourhoods(
 ) -> list[FaceNeighbourhood]:
     """Build the neighbourhoods of a face: connected triangles within `face_layers` layers.
 
-    A neighbourhood with a single face node is skipped.
+    A neighbourhood with a single face node is skipped.  Raises MeshError like `Subdomain.build`.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.

@@ -1,8 +1,8 @@
 """Kernels and soft modes V of all subdomains, and the coarse displacements Z_0 that follow from V.
 
-With the soft modes in the coarse space, the largest eigenvalue of the preconditioned dual operator is at most
-1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain (GenEO:
-Spillane & Rixen, IJNME 95, 2013).  Measured values are about 1 / tau.
+With all soft modes (theta < tau, see `local_eigenproblems`), the largest eigenvalue of the preconditioned dual operator
+is at most 1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain
+(GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured eigenvalues are about 1 / tau.
 
 Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  As B B_D^T = I, B Z_0 = 0: Z_0 are displacements
 of the cell with glued active rows.  A mode reaches (is nonzero on) only its subdomain and the subdomain's neighbours.
@@ -154,7 +154,7 @@ def kernels_and_soft_modes(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """Cut the columns `span` out of a matrix, at the sorted `rows` that contain all nonzeros of these columns."""
+    """Cut the columns `span` out of a matrix; `rows` are sorted, and contain all nonzeros of these columns."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

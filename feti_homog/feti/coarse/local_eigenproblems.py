@@ -135,6 +135,7 @@ def eigenproblem(
     """Set up the eigenproblem of a subdomain, or of its faces if `block.facewise`.
 
     Raises:
+        MeshError: a face neighbourhood is not a valid subdomain.
         TypeError: the problem is on the whole boundary, but the operators are not dense.
     """
     if block.facewise:
@@ -168,10 +169,10 @@ def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the eigenvectors q (m, j) with P^T S P q = theta P^T N P q, theta < `threshold`.
+    """Compute the soft eigenvectors q (m, j): P^T S P q = theta P^T N P q with theta < `threshold`.
 
     Args:
-        S: (m, m) P^T S P, regularised on the kernel of S.
+        S: (m, m) P^T S P for the trace space P (n, m), regularised on the kernel of S.
         N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
     """
     m = len(S)

@@ -39,7 +39,7 @@ class NaturalCoarseSpace:
     def __init__(self, operators: InterfaceOperators) -> None:
         """Assemble G, and factor G^T G with all rows active.  Collective.
 
-        Options with the prefix `feti_natural_` are as in `DistributedSolver`.
+        Options with the prefix `feti_natural_`, and exceptions, are as in `DistributedSolver`.
         """
         comm, jump_operator, subdomains = operators.comm, operators.jump_operator, operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
@@ -66,8 +66,8 @@ class NaturalCoarseSpace:
     def activate(self, active: Float) -> None:
         """Set the active rows, where `active` (owned rows,) is 1.  Collective.
 
-        The next projection factors G^T G of these rows.  Motions Z that no active row resists, for example of a free
-        fibre, get the largest diagonal entry s of G^T G as stiffness: G^T G + s Z Z^T.
+        The next product with (G^T G)^-1 factors G^T G of these rows.  Motions Z that no active row resists, for example
+        of a free fibre, get the largest diagonal entry s of G^T G as stiffness: G^T G + s Z Z^T.
         """
         self._active, self._is_factored = active, False
         self.unconstrained_modes = self.free_motions(active)
@@ -78,7 +78,7 @@ class NaturalCoarseSpace:
         return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
-        """Factor G^T G of the active rows.  Collective."""
+        """Factor G^T G of the active rows, if there are modes; raises like `DistributedSolver.factor`.  Collective."""
         self._is_factored = True
         if not self.kernel_dimension:
             return
@@ -126,7 +126,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x, (owned rows,) or (owned rows, k), which is 0 on inactive rows.  Collective."""
+        """Compute P x for x (owned rows,) or (owned rows, k), with 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:

@@ -1,4 +1,4 @@
-"""The layout of the constraints B on one rank, and the interface nodes, whose bonds can break."""
+"""The layout of the jump operator B on one rank, and the interface nodes, where bonds can break."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class InterfaceNodes:
 
     Attributes:
         row: (k,) first row of the bond among the owned rows: in the plane the normal row, before the tangential row.
-        points: (k, 2) position on the fibre.
+        points: (k, 2) position of the fibre's copy, in the coordinates of `Submesh.points`.
         normal: (k, 2) unit normal from the inner to the outer body; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent number of the fibre.
@@ -58,7 +58,7 @@ class ConstraintLayout:
         count: (n,) number of rows at an entity.
         first: (n,) first local row at an entity.
         rows: (local rows,) global row numbers.
-        dofs: (subdomains + 1,) first local dof by subdomain, and the number of all dofs.
+        dofs: (subdomains + 1,) first local dof of every subdomain, then the number of local dofs.
         owned: half-open range of the global rows that this rank owns.
         base: (sharers,) local number of the sharer's first fine node on the entity; -1 for sharers on other ranks.
     """
@@ -95,8 +95,8 @@ class ConstraintLayout:
         component, identity = np.arange(c), np.eye(c)
         none = np.zeros(0, np.int64)
         rows, columns, values = [none], [none], [none.astype(float)]
-        # Entities with equal codes form a group: their bodies have equal numbers of copies, and their bonds all can or
-        # all cannot break.  Bits mark the first copy of every body, the end of the copies, and breakable bonds.
+        # Entities with equal codes form a group: their bodies have equal numbers of copies, and all or none of their
+        # bonds can break.  Bits mark the first copy of every body, the end of the copies, and breakable bonds.
         entity, copy = expand(np.arange(len(shared.key)), shared.copies)
         codes = np.zeros((len(shared.key), shared.copies.max(initial=0) + 2), bool)
         codes[entity, copy] = (copy == 0) | (np.diff(shared.body, prepend=-1) != 0)
@@ -127,17 +127,17 @@ class ConstraintLayout:
         return coo_matrix(parts, shape=(len(self.rows), self.dofs[-1])).tocsr()
 
     def _places(self, entity: Int, p: Int) -> Float:
-        """Compute positions s (i,) in [0, 1] of fine nodes p (i,) along their edges; 0 at vertices."""
+        """Compute positions s (i,) in [0, 1] of fine nodes p (i,) along edges `entity` (i,); 0 at vertices."""
         return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
 
     def _normals(self, entity: Int, p: Int) -> Float:
-        """Compute unit normals (i, 2) at fine nodes p (i,) of entities (i,)."""
+        """Compute unit normals (i, 2) of interfaces at fine nodes p (i,) of entities `entity` (i,)."""
         shared = self.shared
         normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def node_rows(self) -> tuple[Int, Int]:
-        """Return the first owned row and the number of rows of every owned fine node, both (nodes,)."""
+        """Return the first row (position among owned rows) and row count of every owned fine node, both (nodes,)."""
         shared = self.shared
         mine = np.flatnonzero(self._is_owned)
         size = self.components * (shared.copies[mine] - 1)
@@ -198,9 +198,9 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Find the m interface nodes whose first copy in the outer body is on this rank.
+        """Find the m interface nodes with their first copy in the outer body on this rank.
 
-        Returns the first local row (m,) of their bonds, and the local numbers (m,) of the copies.
+        Returns the first local row (m,) of each bond, and the local node number (m,) of each copy.
         """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
@@ -210,7 +210,7 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """List the entity and the position p of every fine node; `nodes` (e,) counts the nodes of `entities` (e,)."""
+    """Return the entity and the position p on it for every fine node; `entities` (e,) have `nodes` (e,) fine nodes."""
     ends = np.cumsum(nodes)
     p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
     return np.repeat(entities, nodes), p

@@ -80,13 +80,13 @@ class InterfaceNeighbours:
 
     Attributes:
         rows: (n,) first global row of the bond.
-        first: number of the first node on this rank.
+        first: number of the first node on this rank; 0 on a rank without nodes.
         adjacency: (n, n) matrix with 1 between adjacent nodes.
         near: (n, most neighbours + 1) every node and its neighbours, padded with the node.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Find adjacent nodes along interfaces.  Collective."""
+        """Find adjacent nodes along interfaces.  Collective.  Raises ValueError if rows of this rank do not ascend."""
         rows = jump_operator.owned[0] + jump_operator.nodes.row
         if (np.diff(rows) <= 0).any():
             raise ValueError("interface nodes of a rank: expected ascending rows")
@@ -118,9 +118,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) by rows of adjacent nodes, until there are `enough` rows.
+        """Extend global rows (k,) by rows of adjacent nodes to at least `enough` rows; return all rows, sorted.
 
-        `choose` filters the candidates.  The search goes from neighbour to neighbour, up to the ends of interfaces.
+        `choose` filters the candidates.  The search also ends where it finds no further adjacent node.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:
@@ -132,7 +132,7 @@ class InterfaceNeighbours:
             bonds = extended
 
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
-        """Look up the interface node number (local fine nodes,) of every local fine node; -1 for others."""
+        """Return the interface node number (local fine nodes,) of every local fine node; -1 off interfaces."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))

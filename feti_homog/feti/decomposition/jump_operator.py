@@ -1,9 +1,9 @@
 """The jump operator B on one rank, the layout of the multipliers, interface springs, and node blocks.
 
 A fine node has k copies in the subdomains.  Copies within one body are glued in x and y by orthonormal contrasts, and
-can never part.  An inner body, such as a fibre, and the body around it are glued by one pair of rows (n, t) between
-the means of their copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is the gap, and a
-multiplier is the nodal force between the faces, positive in tension.
+can never part.  An inner body, such as a fibre, and the body around it are glued by two rows, along the normal n and
+the tangent, between the means of their copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is
+the gap, and a normal multiplier is the nodal force between the faces, positive in tension.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class InterfaceSprings:
 
     Attributes:
         stiffness: for every interface of the case, stress per length for opening and slip, or for slip along the
-            fibres; inf is rigid.
+            fibres; inf is rigid.  Without springs, the tuple is empty.
         soften: whether the compliance may grow during the run.
     """
 
@@ -54,7 +54,7 @@ class JumpOperator:
 
     Attributes:
         comm: communicator of all ranks.
-        problem: components of the displacement, and unit loads, also for ranks without subdomains.
+        problem: displacement components and unit loads, also on ranks without subdomains.
         components: number of rows of a vector constraint.
         B: (local rows, local dofs) signed and rotated entries; local rows are all rows with an entry at a local dof.
         rows: (local rows,) global row numbers.
@@ -78,6 +78,7 @@ class JumpOperator:
         lattice: ReferenceLattice,
         problem: Problem = PLANE,
     ) -> None:
+        """Assemble B, and find the interface nodes of this rank.  Collective."""
         self.comm, layout = comm, ConstraintLayout(shared, subdomains, lattice, problem.components)
         self.problem, self.components = problem, layout.components
         self.shared, self._first, self._count = shared, layout.first, layout.count
@@ -100,25 +101,25 @@ class JumpOperator:
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """Gather the local rows of x (owned rows,) or (owned rows, k).  Collective."""
+        """Gather the local rows of x (owned rows,) or (owned rows, k); may return x itself.  Collective."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows.  Collective."""
+        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows, or x itself.  Collective."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
         """Send the numbers of outer node copies to the owners of interface nodes.  Collective.
 
-        Every rank passes `numbers` of all its fine nodes, and receives the numbers (k,) at its interface nodes.
+        Every rank passes `numbers` (local fine nodes,), and receives the numbers (k,) at its interface nodes.
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
-        local[rows] = numbers[copies]  # exact, as integers below 2^53 are
+        local[rows] = numbers[copies]  # integers below 2^53 are exact
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """Return the scatter for the number of columns of x; the last KEPT_EXCHANGES scatters are cached."""
+        """Return the scatter for the column count of x, from a cache of KEPT_EXCHANGES scatters.  Collective."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
         exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
         self._exchanges[columns] = exchange
@@ -128,7 +129,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """The PETSc scatter between owned and local rows for k columns; no operation if these rows are equal."""
+    """The PETSc scatter between owned and local rows for k columns; no operation if both layouts agree."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))
@@ -142,7 +143,7 @@ class _Exchange:
         index_set.destroy()
 
     def gather(self, owned: Float) -> Float:
-        """Gather the local rows of x (owned rows,) or (owned rows, k).  Collective."""
+        """Gather the local rows of x (owned rows,) or (owned rows, k); x itself if layouts agree.  Collective."""
         if self._same:
             return owned
         self._owned.getArray()[:] = owned.ravel()
@@ -151,7 +152,7 @@ class _Exchange:
         return local.copy()
 
     def sum(self, local: Float) -> Float:
-        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows.  Collective."""
+        """Sum x (local rows,) or (local rows, k) to owned rows; return x itself if layouts agree.  Collective."""
         if self._same:
             return local
         self._owned.zeroEntries()

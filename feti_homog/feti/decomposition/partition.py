@@ -36,8 +36,9 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
-    The strips run along x or y, with about half of the triangles each (within STRIP_SLACK), and with as few boundary
-    edges as possible; boundaries of two METIS parts are up to 50 % longer.  Returns None if a strip is not connected.
+    The strips run along x or y, with about half the triangles each (within STRIP_SLACK), and with the fewest boundary
+    edges of the cuts tried; METIS cuts are up to 50 % longer.  Islands of a strip join the other strip.  Returns None
+    if a strip is still not connected.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -59,7 +60,7 @@ def halves(torus: Torus) -> Partition | None:
     connected = periodic_topology.components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
-    piece ^= ~np.isin(connected, main)  # islands go to the strip around them
+    piece ^= ~np.isin(connected, main)  # islands join the strip around them
     together = piece[tail] == piece[head]
     is_whole = periodic_topology.components(len(piece), tail[together], head[together]).max() == 1
     return Partition(piece, np.arange(2)) if is_whole else None
@@ -106,7 +107,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
 
 
 def pieces_for_count(load: Int, count: int) -> Int:
-    """Choose piece counts (b,) of bodies of `load` (b,) triangles: divide the largest piece until there are `count`."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles: cut the largest pieces, up to `count` in all."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
@@ -125,13 +126,13 @@ def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
 
 
 def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
-    """Sum the weights of pairs (left, right) into a symmetric matrix (n, n)."""
+    """Build the adjacency matrix (n, n) from pairs (left, right); weights of repeated pairs add up."""
     both = (np.r_[left, right], np.r_[right, left])
     return coo_matrix((np.r_[weight, weight], both), shape=(n, n)).tocsr()
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into parts (n,) with a small edge cut and equal `load` (n,), or equal vertex counts."""
+    """Divide a graph by METIS into `count` parts (n,) of about equal `load` (n,) or, if None, connected if possible."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

@@ -1,4 +1,4 @@
-"""Coarse vertices and edges that subdomains share: numbers of constraints, normals and lengths of interfaces.
+"""Coarse vertices and edges that subdomains share: constraint numbers, normals and lengths of interfaces.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains, its sharers.  A fine node on an entity
 with k sharers needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints
@@ -27,8 +27,8 @@ SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POIN
 def along(ends: Float, turn: Float, place: Float) -> Float:
     """Interpolate y (k, 2) at s = `place` (k,) in [0, 1] from its values `ends` (k, 2, 2) at s = 0 and s = 1.
 
-    y is dx / ds, or a normal of the same length.  On an arc of an ellipse, over which the parametric angle grows by
-    `turn` (k,), y'' = -turn^2 y; on straight edges `turn` is 0, and y is linear.
+    y is dx / ds, or a normal with the length |dx / ds|.  On an arc of an ellipse, with the increment `turn` (k,) of the
+    parametric angle, y'' = -turn^2 y; on straight edges `turn` is 0, and y is linear.
     """
     sine = np.where(turn > 0, np.sin(turn), 1.0)
     of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine
@@ -37,7 +37,7 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """Integrate tributary lengths (k, order + 1) from s = `low` (k,) to `low` + `side`; see `along`."""
+    """Integrate tributary lengths (k, order + 1) of side nodes from s = `low` (k,) to `low` + `side`; see `along`."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
@@ -46,7 +46,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """Return the case interface (n,) of every shared entity, as in `SharedEntities.pair`.
 
-    The number is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
+    It is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -68,7 +68,7 @@ def interface_geometry(
 ) -> tuple[Float, Float, Bool]:
     """Compute normal, turn and precracked of `SharedEntities` on owned entities.  Collective.
 
-    Results are 0 on other entities, and where bonds never break.  `pairs` and `lattice` are as in `share_entities`.
+    Values elsewhere, and where bonds never break, have no meaning.  Arguments and MeshError are as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
@@ -124,7 +124,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
     """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
-    Edges (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), which are entities or the pinned class.
+    Edges with keys `edge` (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), entities or pinned.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]
@@ -133,7 +133,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
     code, at, parts = distributed_arrays.exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
-    # Rounding depends on the order of edges, which is therefore the same on any number of ranks.
+    # Rounding depends on the order of summation, which is therefore the same on any number of ranks.
     sequence = np.lexsort(at.T)
     np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
@@ -142,14 +142,14 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
     """Compute outward normals (n, 2, 2) at both ends of edges, and turns (n,), as in `SharedEntities`.
 
-    `triangle` (n,) are triangles or pixels, `k` (n,) the positions of the edges.
+    `triangle` (n,) are triangles or pixels, and `k` (n,) positions of the edges in them.
     """
     a, b = (mesh.points[mesh.triangles[triangle, (k + step) % mesh.triangles.shape[1]]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
     turn = mesh.turns[plane]
     tangents = np.repeat((b - a)[:, None], 2, axis=1)
     curved = turn > 0
-    # On an arc about c the place y obeys y'' = -turn^2 y.
+    # On an arc, the vector y from the centre obeys y'' = -turn^2 y.
     angle, centre = turn[curved, None], mesh.circles[plane[curved], :2]
     start, stop = a[curved] - centre, b[curved] - centre
     slopes = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)
@@ -167,11 +167,11 @@ class SharedEntities(Sharers):
     Attributes:
         nodes: (n,) number of fine nodes on the entity: 1 at a vertex, the inner lattice nodes on an edge.
         first: (n,) number of the first vector constraint.
-        body: (sharers,) body of a sharer.
+        body: (sharers,) body of every sharer.
         fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
         pair: (n,) case interface between both bodies; -1 where no bond can break.
         normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for
-            s in [0, 1]; at a vertex, of the vertex's tributary length.
+            s in [0, 1]; at a vertex, two equal normals of its tributary length.
         turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: half-open range of the vector constraints that this rank owns.
@@ -191,7 +191,7 @@ class SharedEntities(Sharers):
 
     @property
     def pieces(self) -> set[int]:
-        """Return the subdomains that share a node with a piece of their own body, or with several bodies."""
+        """Return the subdomains at entities that have more than two sharers, or two sharers in one body."""
         body = self.body
         between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
         return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())

@@ -56,7 +56,7 @@ class Sharers:
 
 
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
-    """Encode keys (n,) of vertex classes or torus edges as unique numbers (n,), odd for edges."""
+    """Encode keys (n,) of vertex classes or torus edges as unique codes (n,), odd for edges."""
     return np.asarray(2 * key + is_edge)
 
 
@@ -92,7 +92,7 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """Return unique pairs (key, member) whose key has several members or lies at the border.
+    """Return unique pairs (key, member) for keys with several members, or at the border.
 
     `keys` (t, 3) and `member` (t,) belong to triangles; negative keys are skipped.  `at_border` is (number of keys,).
     """

@@ -27,11 +27,11 @@ class Subdomain:
         problem: components of the displacement, and unit loads.
         L: (v, v) stiffness of the material, see `assemble`; with several materials, the mean over the area.
         laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
-        Q: (cn, v) unit loads: f = -Q E; with given tractions on the sides (cn, v + m), f = -Q [E, Sigma].
+        Q: (cn, v) unit loads, forces f = -Q E; with tractions t = Sigma n on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
         areas: (materials,) area of every material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
-            without the motions that held classes prevent.
+            without the motions that held classes prevent; k = 0 if springs hold the subdomain.
         held: classes with u* = 0: pinned classes, and the nodes on sides that move by E x.
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
@@ -101,7 +101,7 @@ class Subdomain:
         mixed: assembly.Mixed = False,
         **flags: bool,
     ) -> Subdomain:
-        """Assemble K and Q on a refined mesh, without communication; see `build`."""
+        """Assemble K and Q on the refined `mesh`, without communication; raises MeshError for |K R|, like `build`."""
         body = assembly.assemble(mesh, laws, problem, mixed, material)
         shift, closes = mesh_fibres.unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
@@ -131,7 +131,7 @@ class Subdomain:
         return subdomain
 
     def mean_strain(self, dofs: Int) -> Float:
-        """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to int eps*.
+        """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to the strain integral int eps*.
 
         The integral covers the subdomain and its share of adjacent voids: int_Omega eps*, plus int u (x) n ds over the
         boundaries of the voids, with n outward from the voids.
@@ -168,7 +168,7 @@ class Subdomain:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
         If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to the stiffness of the body, which may be far larger than all forces on the body.
+        adds rounding in proportion to its stiffness, perhaps far above all forces.  Else, the result is `answers`.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -192,9 +192,9 @@ class Subdomain:
     def compressible_share(self) -> float:
         """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) on the diagonal of K.
 
-        The factor reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu,
-        but single nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for
-        several materials, none of which is nearly incompressible.
+        The factor reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu;
+        single nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for several
+        materials, all far from incompressible.  lambda and mu are the Lame constants of L.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -202,9 +202,9 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """Return an elimination order (cn,) of all dofs, or None where the library's order is cheaper.
+        """Return an elimination order (cn,) of all dofs, or None if the direct solver should choose.
 
-        The library's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
+        The direct solver's order is cheaper for fewer than LEAST_ORDERED_DOFS dofs, or without refinement.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(refinement.elimination_order(self.mesh)) if pays else None
@@ -215,13 +215,13 @@ class Subdomain:
         return self.assemble_stiffness() if K is None else K
 
     def assemble_stiffness(self) -> csr_matrix:
-        """Assemble K (cn, cn), Eq. (28), with scaled unit rows for held classes (15)."""
+        """Assemble K (cn, cn), Eq. (28), with scaled unit rows for held classes, Eq. (15), and supporting springs."""
         body = assembly.assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
         K = _held(body.K, self.problem, self.held)
         return K if self._support is None else (K + self._support).tocsr()
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
-        """Compute fixing dofs (f,), and the block rho Rf Rf^T (f, f) on these dofs whose sum with K is SPD.
+        """Compute fixing dofs (f,), and the term rho Rf Rf^T (f, f) on these dofs: K plus the term is definite.
 
         The inverse of the sum is a generalized inverse K+ of K (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME
         88, 2011).  The dofs belong to one to three nodes of `candidates`, far apart; Rf is the kernel on these dofs,
@@ -255,7 +255,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2), without motions of nodes `held`."""
+    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2) that leave nodes `held` at rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:
@@ -267,14 +267,14 @@ def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Floa
 
 
 def label(submesh: Submesh) -> str:
-    """Name a subdomain in messages by number, phase and a point."""
+    """Return the name of a subdomain in messages: number, phase and a point."""
     x, y = submesh.points[0] + submesh.origin
     kind = f" ({submesh.phase})" if submesh.phase else ""
     return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 
 
 def _held(K: csr_matrix, problem: Problem, held: Int) -> csr_matrix:
-    """Replace the rows and columns of the nodes `held` in K by a multiple of I."""
+    """Replace rows and columns of nodes `held` in K by a multiple of I, in place; return K."""
     if not len(held):
         return K
     is_held, largest = np.zeros(K.shape[0], bool), K.diagonal().max()

@@ -35,7 +35,7 @@ class ExactInverse(Preconditioner):
         norm: upper bound of |H|.
         factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns above which unused columns are dropped; read when following starts anew.
+        most_followed: number of columns above which unused columns are dropped; applies from the next reference cell.
     """
 
     is_exact = True
@@ -47,7 +47,7 @@ class ExactInverse(Preconditioner):
         All boundary operators must be dense.  Options: `feti_influence_columns`.
 
         Raises:
-            CaseError: the value of the option is below 1.
+            CaseError: the value of the option is below 1.  Other exceptions are as in `ReferenceCell`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         is_small = jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
@@ -78,13 +78,13 @@ class ExactInverse(Preconditioner):
         self._next = more
 
     def activate(self, active: Float) -> None:
-        """Restrict H to rows where `active` (owned rows,) is 1.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1; raises like `ReferenceCell`.  Collective."""
         if not self._follow(active, self._next, thresholds.LEAST_FOLLOWED):
             self._active, self._more = active, self._next
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state; return False if a pivot is at most `pivot`.  Collective."""
+        """Update followed columns to the next state; return False if `FollowedResponse.follow` fails.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -124,20 +124,20 @@ class ExactInverse(Preconditioner):
 
     @property
     def _rows_with_pins(self) -> Float:
-        """Return 1 on active rows and on pins (see `followed_response`), else 0: (owned rows,)."""
+        """Mark active rows and pins (see `followed_response`) by 1, other rows by 0: (owned rows,)."""
         holds, pins = self._active.copy(), self._followed.pins - self._first
         holds[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
         return holds
 
     def _changes(self) -> ReferenceChanges:
-        """Return the changes since the reference cell.  Collective."""
+        """Collect the rows that have changed since the reference cell was factored.  Collective."""
         kinds = np.stack([self.reference.active - self._rows_with_pins, self._more * self._active], axis=1)
         places = np.flatnonzero(kinds.any(axis=1))
         parts = zip(*self.comm.allgather((self._first + places, kinds[places])), strict=True)
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Return the changes since the reference cell, which is renewed after too many changes.  Collective."""
+        """Collect the changed rows, after a new reference cell if there are too many.  Collective."""
         changes = self._changes()
         if len(changes.rows) - self._tie_count <= self._max_changes:
             return changes
@@ -162,7 +162,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global rows (k,); return False if their asymmetry exceeds `max_error`.  Collective."""
+        """Follow columns at `rows`, and drop none at `needed`; False if asymmetry exceeds `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -173,9 +173,9 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Return the `rows` without columns, and neighbouring active rows without columns.  Collective.
+        """Select the `rows` without columns, and active rows without columns near them.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows get no neighbours.
+        Neighbours of broken bonds break next, and columns are cheaper together.  If no row is active, none is added.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
@@ -183,12 +183,12 @@ class ExactInverse(Preconditioner):
 
     @property
     def _are_active(self) -> Bool:
-        """Return whether each row of the cell is active: (all rows,).  Collective."""
+        """Gather the mask (all rows,) of active rows.  Collective."""
         return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
 
     @property
     def rounding(self) -> float:
-        """Compute the relative rounding error of H.  Collective.
+        """Compute the relative rounding error of the reference cell's H.  Collective.
 
         Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
@@ -208,14 +208,14 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E (owned rows, k) for loads E (v, k); all calls pass the same d (owned rows, v).  Collective."""
+        """Compute H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
-        positions.  Returns None if the number of free motions in the columns differs from `free`.
+        positions.  Returns None, and restarts old columns, if their number of free motions differs from `free`.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -229,8 +229,8 @@ class ExactInverse(Preconditioner):
     def renew_answer(self, d: Float) -> Float:
         """Compute the answer U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
 
-        `d` (owned rows, v) holds the jumps of the torn cell under unit loads.  The new U has no rounding from earlier
-        updates, and replaces the stored U.
+        `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
+        rounding from earlier updates, and replaces the stored U.
         """
         changes = self._up_to_date()
         if self._answer is None:
@@ -241,7 +241,7 @@ class ExactInverse(Preconditioner):
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
+        """Compute the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
         All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """
@@ -249,10 +249,10 @@ class ExactInverse(Preconditioner):
         return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
-        """Return columns of H in the reference cell at global rows (k,).  Collective.
+        """Return columns of Gamma, the reference cell's response, at global rows (k,).  Collective.
 
         The columns are (owned rows, k), followed by their entries (k, k) at `rows`.  Before the first `activate`, the
-        reference cell is the bonded cell.
+        reference cell is the bonded cell, and Gamma is H.
         """
         if len(self._unchanged.lacking(rows)):
             missing = self._with_near(rows, self._unchanged)

@@ -36,7 +36,7 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows of pins, which hold bodies that no active row holds.
-        had_pins: whether a body has been free; U then loses digits with every change of that body's few faces.
+        had_pins: whether a body has been free; U then loses digits at every change on the interface of that body.
     """
 
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
@@ -63,9 +63,9 @@ class FollowedResponse:
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Make room for `more` columns: drop the least recently used columns.
+        """Make room for `more` columns: if necessary, drop the least recently used columns.
 
-        Columns of the rows `needed` are not dropped; columns of `useful` rows (all rows,) are dropped last.
+        Columns of the rows `needed` stay, even above the capacity; columns of `useful` rows (all rows,) go last.
         """
         capacity = len(self._used)
         if len(self._rows) + more <= capacity:
@@ -135,7 +135,7 @@ class FollowedResponse:
     def follow(self, rows: Int, signs: Float, gains: Float, pivot: float = thresholds.LEAST_FOLLOWED) -> bool:
         """Update U and the columns for changed rows.  Collective.
 
-        Returns False if a scaled pivot is at most `pivot`: digits are lost, and U and Gamma are then useless.
+        Returns False, with U and Gamma useless, if a scaled pivot is at most `pivot` or too many pins become inactive.
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.
@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B (Gamma_I:, U_I): from U at once, from columns later; `_present` returns `values`."""
+        """Subtract `difference` B [Gamma_I:, U_I] from columns (later) and U (now); `values` come from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
@@ -251,8 +251,8 @@ class FollowedResponse:
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
     """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
 
-    Rows can always become active (sign -1); rows can become inactive (1) as long as no body becomes free.  The result
-    is None if a scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1); rows can become inactive (1) if no body becomes free.  The result is None
+    if a scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))

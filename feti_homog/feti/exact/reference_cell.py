@@ -46,6 +46,7 @@ class AssembledSchur:
 
         Raises:
             TypeError: a boundary operator is not dense.
+            LinAlgError, MemoryError, CaseError: as in `DirectSolver`.
         """
         is_inactive, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
         starts, sizes = jump_operator.node_rows
@@ -139,7 +140,7 @@ class BodyTies:
         self._pair = pair[begin : begin + len(nodes.row)]
 
     def tied(self, active: Float) -> Float:
-        """Return `active` (owned rows,) with 1 on the ties of bodies with fewer than two bonds.  Collective."""
+        """Copy `active` (owned rows,), with 1 on the ties of bodies with fewer than two bonds.  Collective."""
         bonded = active[self._rows].prod(axis=1)
         local = np.bincount(self._pair, bonded, len(self._ties)).astype(float)
         bonds = distributed_arrays.allreduce_sum(self._comm, local)
@@ -159,7 +160,10 @@ class ReferenceCell:
     """
 
     def __init__(self, operators: InterfaceOperators, one_sided: csr_matrix, active: Float) -> None:
-        """Factor the cell with the active rows A.  Collective; `one_sided` is B_D of `one_sided_jumps`."""
+        """Factor the cell with the active rows A; `one_sided` is B_D of `one_sided_jumps`.  Collective.
+
+        Raises like `AssembledSchur` and `SpringUpdate`.
+        """
         comm, jump_operator = operators.comm, operators.jump_operator
         self._comm, self.active, self._jump_operator, self._operators = comm, active, jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
@@ -179,10 +183,7 @@ class ReferenceCell:
         return self._springs.apply(self._without_springs(x))
 
     def columns(self, rows: Int) -> Float:
-        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,).  Collective.
-
-        All ranks pass the same rows.
-        """
+        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,), equal on all ranks.  Collective."""
         # Batches of about COLUMNS_AT_ONCE: a small last batch would cost more than slightly larger batches.
         columns = [np.zeros((len(self.active), 0))]
         for batch in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
@@ -193,10 +194,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute the largest |Gamma r| / `stiffness` for jumps r of unit rigid-body motions.  Collective.
-
-        `stiffness` is (owned rows,); without rounding the result is 0.
-        """
+        """Compute max |Gamma r| / `stiffness` (owned rows,) for jumps r of unit rigid-body motions.  Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         units = (motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)
@@ -231,7 +229,7 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs) with B B_D^T = I, moving one body per bond.  Collective.
+    """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
 
     Only the moved body needs forces.  The inner body moves, unless its forces would lose digits because it is more than
     STIFF_FIBRES times as stiff as the outer body.
@@ -246,7 +244,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     weights = B.data[mine] ** 2
     terms = weights * operators.diagonal[B.col[mine]], weights
     sums = [np.bincount(side[mine], values, side_count) for values in terms]
-    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # integers without bonds
+    total, count = distributed_arrays.allreduce_sum(comm, np.stack(sums).astype(float))  # integers if no bonds
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
     moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])

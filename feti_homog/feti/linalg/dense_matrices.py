@@ -133,7 +133,7 @@ def _can_be_ordered() -> bool:
 
 
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:
-    """Condense a matrix K and loads Q by the factorization K + D = L L^T.
+    """Condense a matrix K and loads Q by the factorization K + D = L L^T; raises like `schur_complement`.
 
     D > 0 on `rows` makes K + D definite even if K is singular.  With y = L^-1 Q and the block L_bb of L on `rows` b,
     S = L_bb L_bb^T - D, q = L_bb y_b and C = -y_i^T y_i.
@@ -206,9 +206,9 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Invert an SPD matrix A (n, n), in Fortran order, in its upper triangle.
+    """Overwrite the upper triangle of an SPD matrix A (n, n), in Fortran order, with the inverse.
 
-    Entries below the diagonal do not change.
+    Entries below the diagonal are not read and do not change.
 
     Raises:
         LinAlgError: A is not positive definite.
@@ -232,10 +232,7 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = BLOCK_ROWS) -> Float:
-    """Copy the lower triangle of A (n, n) to a symmetric matrix (n, n), in C order.
-
-    The copy proceeds by blocks of `block` rows, which fit the cache.
-    """
+    """Copy the lower triangle of A (n, n) to a symmetric matrix in C order; blocks of `block` rows fit the cache."""
     full, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
         rows = slice(j, j + block)

@@ -153,14 +153,14 @@ class PartialFactor:
             block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
             if i.min() < 0 or columns.min() < 0:
                 block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
-            if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # as a rule: one block
+            if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # usually one block
                 U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
             else:
                 U.T[np.ix_(columns, i)] = block
         return U
 
     def forward(self, B: Float) -> Float:
-        """Compute L^-1 B (n, k) for B (n, k); rows of the result are in the order of elimination."""
+        """Compute L^-1 B for B (n, k); rows of the result follow `order`, and end with `rows`."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")

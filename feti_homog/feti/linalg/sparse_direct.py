@@ -54,7 +54,7 @@ def check_factor(pc: PETSc.PC) -> None:
     """Raise an exception if the library of `pc` reports an error or wrong pivots.
 
     Raises:
-        LinAlgError: the matrix of a Cholesky factorization is not positive definite, or MUMPS has replaced tiny pivots.
+        LinAlgError: the matrix is singular or, with Cholesky, not positive definite, or MUMPS replaced tiny pivots.
         MemoryError: MUMPS cannot factor, usually for lack of memory.
     """
     library, is_cholesky = pc.getFactorSolverType(), pc.getType() == PETSc.PC.Type.CHOLESKY
@@ -194,7 +194,7 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
 
 @contextmanager
 def _unless_given(options: Options, prefix: str) -> Iterator[None]:
-    """Set PETSc options within the block, except options that the user has set."""
+    """Set PETSc options within a `with` block, except options that the user has set."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():
@@ -213,7 +213,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Return a PETSc matrix on this rank that shares the arrays of a sparse matrix."""
+    """Return a PETSc matrix on this rank that shares the arrays of a sparse matrix; its indices are sorted first."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

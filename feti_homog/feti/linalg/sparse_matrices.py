@@ -70,7 +70,7 @@ def assemble_owned_rows(
 
 
 def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
-    """Sum local matrices over ranks; return the local rows (r, n).  Collective.
+    """Sum local matrices over ranks; return the local rows (r, n), on one rank `local` itself.  Collective.
 
     Args:
         local: (r, n) contribution of this rank; all ranks have the same n columns.
@@ -107,7 +107,7 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, to
 
 
 def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """Sum sparse matrices (n, n) over ranks, on every rank.  Collective."""
+    """Sum sparse matrices (n, n) over ranks, on every rank; on one rank return `part`.  Collective."""
     if comm.size == 1:
         return part
     numbers = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)

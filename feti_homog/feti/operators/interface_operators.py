@@ -35,8 +35,8 @@ class SubdomainSize:
     Attributes:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
-        is_whole_body: whether every shared node belongs to a single other body.
-        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ is then dense.
+        is_whole_body: whether every shared node has one other sharer, in another body.
+        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ (`with_springs`) is dense.
     """
 
     dofs: int
@@ -55,15 +55,15 @@ def choose(
 ) -> tuple[list[bool], list[bool]]:
     """Choose the boundary operators of every subdomain.
 
-    Returns two flags for every subdomain: `explicit`, dense matrices instead of sparse factors, and `facewise`, soft
-    modes computed face by face.
+    Returns two lists with a flag for every subdomain: whether it gets dense matrices instead of sparse factors, and
+    whether it is facewise: its soft modes are computed face by face.
 
-    By default a subdomain with n <= `dense_boundary_dofs` gets dense matrices if the inverse takes no longer than all
-    products by sparse factors (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
+    By default a subdomain with n <= `dense_boundary_dofs` boundary dofs gets dense matrices if the inverse costs less
+    than all sparse solves (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
     modes need the whole boundary.  Whole bodies without springs are facewise if n > `whole_boundary_dofs`.
 
     Args:
-        sizes: sizes of the subdomains; the result has the same order.
+        sizes: sizes of the subdomains; both results are in this order.
         kind: the option `-feti_dual_operator`, one of KINDS; a subdomain with n = 0 never gets dense matrices.
         applications: expected number of products with the operators.
         soft_modes: whether soft modes will be computed.
@@ -99,7 +99,7 @@ class DualOperator:
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam (boundary dofs, k), which Eq. (34) subtracts.  Collective."""
+        """Compute K+ B^T lam (boundary dofs, k) for lam (owned rows, k), which Eq. (34) subtracts.  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
@@ -195,7 +195,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return whether boundary dofs (n,) belong to an inner body: to any body at the node except the outermost."""
+        """Return the mask (n,) of boundary dofs in an inner body: in any body at a node except the outermost."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -224,7 +224,7 @@ class InterfaceOperators:
     def _each(
         self, products: Sequence[Callable[[Float, Float], Float]], x: Float, chosen: Sequence[int] | None = None
     ) -> Float:
-        """Apply the products of all or the `chosen` subdomains to their parts of x (n,) or (n, k)."""
+        """Apply the products of all or the `chosen` subdomains to their parts of x (n,) or (n, k); 0 elsewhere."""
         x = np.asfortranarray(x)
         y = np.zeros(x.shape, order="F")
         for k in range(len(products)) if chosen is None else chosen:
@@ -245,8 +245,8 @@ class InterfaceOperators:
         """Extend boundary displacements x (n_s, k) of a subdomain to all its dofs (dofs, k).
 
         Args:
-            place: position of the subdomain.
-            loads: (v, k) unit loads that act inside, if any.
+            place: position of the subdomain on this rank.
+            loads: (v, k) amplitudes of the unit loads; None without loads.
             keep: whether to store the interior, if this call has to factor it.
         """
         operator, s = self.operators[place], self.subdomains[place]
@@ -274,7 +274,7 @@ class InterfaceOperators:
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
     """Factor one subdomain; return its boundary operator and the diagonal of K on `dofs` (n_s,).
 
-    The subdomain gives up K.  `keep_factor` is as in `ExplicitInterfaceOperator`.
+    The matrix K is taken from the subdomain.  `keep_factor` is as in `ExplicitInterfaceOperator`.
 
     Raises:
         MeshError: rounding leaves K without a factor.

@@ -24,7 +24,7 @@ from feti_homog.typing import Float, Int
 class ExplicitInterfaceOperator:
     """S and S+ of one subdomain as dense matrices (n, n) on its n boundary dofs.
 
-    With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
+    With fixing nodes on the boundary, the inverse of S + rho Rf Rf^T (`Subdomain.fixing`) is the boundary part of K+.
 
     Attributes:
         condensed: unit loads on the boundary.
@@ -34,12 +34,12 @@ class ExplicitInterfaceOperator:
     is_dense = True
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
-        """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), which are ascending.
+        """Condense K (all dofs, all dofs) to the boundary `dofs` (n,), in ascending order.
 
         Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
-            LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
+            LinAlgError, MemoryError: as in `schur_complement`, or S is not positive definite off its kernel.
         """
         from feti_homog.feti.linalg import dense_matrices  # sparse operators do not need it
 
@@ -86,7 +86,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix with `diagonal` (n,) and one triangle of the array, lower or upper.
+        """Multiply x by a symmetric matrix: `diagonal` (n,), and the lower or upper triangle of the array.
 
         A product is fastest for x in Fortran order.
         """
@@ -147,7 +147,7 @@ class CondensedLoads:
     Attributes:
         boundary: (n, v) q.
         stiffness: (v, v) C, or its sum over subdomains.
-        energy: (v, v) twice the energy at u_b = 0, which is C.  A subdomain without a boundary has
+        energy: (v, v) twice the energy at u_b = 0, equal to C.  A subdomain without a boundary has
             |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which is C only if u_i is exact.
     """
 
@@ -162,7 +162,10 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T; `dofs` (n,) are ascending.  Options have the prefix `feti_sub_`."""
+        """Factor K + rho Rf Rf^T, or K_ii if the subdomain is pinned and has no boundary; `dofs` (n,) are ascending.
+
+        Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
+        """
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
             # A pinned subdomain without a boundary bears the unit loads alone: solve for their displacements now.
@@ -219,9 +222,9 @@ class Interior:
     answers: Float | None = None
 
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
-        """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).
+        """Factor K_ii; `K` (all dofs, all dofs) is split at boundary `dofs` (n,).  Raises like `DirectSolver`.
 
-        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for the library's.
+        Options have the prefix `feti_interior_`.  `order` (all dofs,) is an elimination order, None for the solver's.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False
@@ -261,7 +264,7 @@ class Interior:
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
-    """Apply a function to x (n,), or to batches of COLUMNS_AT_ONCE columns of x (n, k)."""
+    """Apply a function to x (n,), or to batches of COLUMNS_AT_ONCE columns of x (n, k), into `out` if given."""
     if out is None:
         out = np.empty_like(x)
     if not len(x):

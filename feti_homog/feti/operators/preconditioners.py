@@ -4,7 +4,7 @@ M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 on the active rows, with W = B D^-1 B^T and t
 node.  W is block-diagonal by node.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
 
 Springs at the few nodes where both bodies are cut belong to no subdomain.  Let X be the unit vectors of their rows and
-C their compliances.  The preconditioner H, which is M^-1 or H_0, then becomes
+C their compliances.  The preconditioner H, which is M^-1 or H_0 (`coarse.adaptive`), then becomes
 
     H - H X (C^-1 + X^T H X)^-1 X^T H.
 
@@ -91,19 +91,19 @@ class StiffnessScaled(Preconditioner):
         self.activate(np.ones(self.W.rows))
 
     def activate(self, active: Float) -> None:
-        """Invert the active part of W."""
+        """Invert W on rows where `active` (owned rows,) is 1."""
         self.W_inverse = self.W.inverse(active)
 
     def displacement_with_jump(self, g: Float) -> Float:
-        """Compute B_D^T g = D^-1 B^T W^-1 g (boundary dofs, k), displacements with the jumps g on active rows."""
+        """Compute B_D^T g = D^-1 B^T W^-1 g (boundary dofs, k), with the jumps g on active rows.  Collective."""
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """Compute B_D f = W^-1 B D^-1 f (owned rows, k); if f = B^T lam with lam on active rows, this is lam."""
+        """Compute B_D f = W^-1 B D^-1 f (owned rows, k): lam if f = B^T lam for lam on active rows.  Collective."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:
-        """Compute B_D S B_D^T r = W^-1 B D^-1 S D^-1 B^T W^-1 r."""
+        """Compute B_D S B_D^T r = W^-1 B D^-1 S D^-1 B^T W^-1 r.  Collective."""
         return self.multipliers(self.stiffness(self.displacement_with_jump(r)))
 
 
@@ -149,7 +149,7 @@ class SpringUpdate:
         self._places, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """Return the product z = H r, (owned rows,) or (owned rows, k), updated for the springs.  Collective."""
+        """Update z = H r, (owned rows,) or (owned rows, k), for the springs; z itself without springs.  Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, distributed_arrays.gather_rows(self.comm, z, self.first, self.rows))
@@ -174,7 +174,7 @@ class SpringUpdated(Preconditioner):
     """A preconditioner H with `SpringUpdate` for the springs of active rows, which may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
-        """Update H = `inner` with all rows active; `first` and `compliance` as in `SpringUpdate`.  Collective."""
+        """Update H = `inner` with all rows active; arguments and exceptions as in `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._intact_compliance = self._compliance = compliance
         self.is_exact, self.norm = inner.is_exact, inner.norm  # springs only reduce |H|
@@ -185,7 +185,7 @@ class SpringUpdated(Preconditioner):
         self._compliance = self._intact_compliance + more
 
     def activate(self, active: Float) -> None:
-        """Restrict H to rows where `active` (owned rows,) is 1, and update it.  Collective."""
+        """Restrict H to rows where `active` (owned rows,) is 1, and update it, like `SpringUpdate`.  Collective."""
         self._inner.activate(active)
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 

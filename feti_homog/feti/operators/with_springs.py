@@ -84,7 +84,7 @@ class _Softening:
         return np.asarray(self._relaxed(y) - self._root_of_kernel.T @ (self._root_of_kernel @ x))
 
     def matrix(self, S: Float) -> Float:
-        """Compute the symmetric matrix S~ (n, n)."""
+        """Compute the symmetric matrix S~ (n, n) from S (n, n)."""
         A = S + self.stiffness * self.kernel @ self.kernel.T
         G = self._relaxed(A)
         # By symmetry, the differences in columns along the springs are replaced, too.
@@ -126,7 +126,7 @@ class WithSprings:
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """Compute P^T A P (m, m) for P (n, m), where A is the term of the body times the ratio of S~ to S.
+        """Compute P^T A P (m, m) for P (n, m); A is the body's A, scaled from the size of S to S~.
 
         S~ + A is definite, because S and S~ have the same kernel.  The operator must be dense.
         """

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def _for_large_objects(comm: Intracomm) -> Intracomm:
-    """Return the communicator that sends Python objects of any size."""
+    """Wrap the communicator so that it sends Python objects of any size."""
     from mpi4py.util import pkl5  # starts MPI
 
     return pkl5.Intracomm(comm)
@@ -127,7 +127,7 @@ def scale_rows(weights: Float, x: Float) -> Float:
 
 
 def balanced(load: AnyInt, n_ranks: int) -> Int:
-    """Assign loads (n,) to ranks (n,): in descending order, to the rank with the least load."""
+    """Assign loads (n,) to ranks (n,): in descending order, each to the rank with the least load."""
     ranks = np.zeros(len(load), np.int64)
     heap = [(0, rank) for rank in range(n_ranks)]
     for k in np.argsort(-load, kind="stable"):

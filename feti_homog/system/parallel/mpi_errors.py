@@ -27,8 +27,8 @@ class RemoteError(RuntimeError):
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on rank 0, and return the result on every rank.  Collective.
 
-    An exception on rank 0 is raised on every rank.  Arguments on other ranks are ignored.  The result must be
-    picklable, and `function` must not communicate.
+    An exception on rank 0 is raised on every rank, on other ranks as in `agree`.  Arguments on other ranks are ignored.
+    The result must be picklable, and `function` must not communicate.
     """
     result: T = comm.bcast(on_root_only(comm, function, *args, **kwargs), root=0)
     return result
@@ -46,8 +46,8 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
 
-    `function` must not communicate.  A rank raises its own defect.  Other ranks raise RemoteError for the first
-    rank with a defect or, without defects, the first rank's FetiHomogError (NoMemoryError for a MemoryError).
+    `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
+    A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
 
@@ -63,7 +63,7 @@ def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
 
 
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Call a function that communicates, such as a collective call of a library.  Collective.
+    """Call a function that communicates, such as a library's collective function; return its result.  Collective.
 
     If a rank raises a FetiHomogError, every rank raises.  A rank raises other exceptions alone, because the other ranks
     may wait for it within `function`: the caller must end the job.  The job also ends if the other ranks do not return
@@ -102,7 +102,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print an exception of this rank alone, and end the processes of all ranks."""
+    """Print the exception of this rank, and end the processes of all ranks."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
@@ -116,7 +116,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 
 
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
-    """Convert a MemoryError to one line for the user."""
+    """Convert a MemoryError to a NoMemoryError with one line for the user."""
     detail = f": {error}" if str(error) else ""
     hint = "`feti-homog check` estimates the memory of a case, which more ranks share"
     return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")
@@ -136,7 +136,7 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
 
 
 def _comes(request: Request, timeout: float) -> bool:
-    """Wait at most `timeout` seconds for a request; return whether it is fulfilled."""
+    """Wait at most `timeout` seconds for a request; return whether it has completed."""
     deadline = time.monotonic() + timeout
     while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
         time.sleep(0.001)
@@ -144,7 +144,7 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _lines(error: FetiHomogError) -> str:
-    """Return one line for every fault."""
+    """Return the faults as lines that begin with "error: "."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 
@@ -161,7 +161,7 @@ def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T |
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:
-    """Convert an exception for other ranks: a defect becomes its traceback, as it may not be picklable."""
+    """Convert an exception (or None) for other ranks: a defect becomes its traceback, as it may not be picklable."""
     if error is None or isinstance(error, FetiHomogError):
         return error
     if isinstance(error, MemoryError):

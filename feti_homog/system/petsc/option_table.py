@@ -100,7 +100,7 @@ CLOSE = 0.9
 
 
 def unknown_options(names: Iterable[str]) -> list[str]:
-    """Return one fault for every name (without dash) that is unknown or misspelt, or an option unfit for batch runs."""
+    """Return one fault for every name (without dash) that is unknown, misspelt or unfit for batch runs."""
     faults = []
     for name in names:
         hint = ""
@@ -142,7 +142,7 @@ def solver_prefix(name: str) -> str:
 
 
 def help_text() -> str:
-    """Return the help on the solver options, one line per option."""
+    """Return the help on the solver options: a heading, then one line per option."""
     usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
     width = max(map(len, usages))
     lines = [

@@ -66,13 +66,13 @@ def choices(prefix: str) -> dict[str, str]:
 
 
 def without_iterations() -> str:
-    """Return a remark on options that print iterations, for runs without iterations; else ""."""
+    """Return a remark for runs without iterations on options that print iterations; "" without such options."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 
 
 def refuse_unused() -> None:
-    """Refuse options with the prefix `feti_` that no solver has read, after the set-up of all solvers.
+    """Refuse `feti_` options that no solver has read; call this after the set-up of all solvers.
 
     Options in the table are accepted, because a run may make their solvers later or not at all.
 
@@ -109,9 +109,9 @@ class _Identity:
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     """Return the faults of options with which PETSc's solvers cannot be made.
 
-    `options` has the names without dash and the values in the database.  Every solver is made for a 1 x 1 matrix and
-    applied once, because some methods fail only then.  PETSc marks the options that it reads, and prints all readable
-    options with -help.  Options that print are removed meanwhile.
+    `options` has the names without dash and the values in the database.  Every solver with options (with -help, every
+    solver) is made for a 1 x 1 matrix and applied once, because some methods fail only then.  PETSc marks the options
+    that it reads, and prints all readable options with -help.  Options that print are removed meanwhile.
     """
     faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
     try:

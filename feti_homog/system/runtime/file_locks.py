@@ -118,7 +118,7 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Return the name (see `this_process`) of the process with the exclusive lock; None without a lock."""
+    """Return the name (see `this_process`) of the process with the exclusive lock; None without lock or access."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None
@@ -141,7 +141,7 @@ def tag() -> str:
 
 
 def has_ended(name: str) -> bool:
-    """Return whether the process that made a `tag` has ended; False for tags of other machines."""
+    """Return whether the process that made a `tag` has ended; False for other machines and other names."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 

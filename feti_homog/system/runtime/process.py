@@ -60,7 +60,7 @@ def trim_memory(kept: int = 0) -> None:
 
 
 def peak_memory() -> int:
-    """Return the largest resident memory in bytes since `forget_peak`."""
+    """Return the largest resident memory in bytes since the last `forget_peak`, or else since the start."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
@@ -88,7 +88,7 @@ def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
 
 
 def prefer_own_toolkits() -> None:
-    """Search `mpl_toolkits` first beside the `matplotlib` that Python finds, without importing Matplotlib.
+    """Let Python search `mpl_toolkits` first beside its `matplotlib`, without importing Matplotlib.
 
     In an environment with --system-site-packages, Debian's matplotlib-nspkg.pth binds `mpl_toolkits` to Debian's folder
     at the start of Python.  A Matplotlib in the environment cannot import its 3-D axes from there, and would warn.
@@ -103,9 +103,9 @@ def prefer_own_toolkits() -> None:
 
 
 def ignore_settings_of_the_folder() -> None:
-    """Import Matplotlib without the `matplotlibrc` of the current folder, and draw without windows.
+    """Keep Matplotlib from reading `matplotlibrc` in the current folder and from opening windows.
 
-    Matplotlib would read this file on import, and raise an exception if the file is damaged.
+    Matplotlib reads this file on import, and fails if it is damaged: if it exists, another folder is current meanwhile.
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:

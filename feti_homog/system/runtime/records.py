@@ -83,7 +83,7 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
 
     Raises:
         KeyError: a key without a default is missing.
-        TypeError: a value has another type, or an array another number of axes, than the field.
+        TypeError, ValueError: a value has another type than its field, or an array has other axes or entries.
     """
     _require(document, Mapping)
     hints, values = typing.get_type_hints(kind), {}
@@ -122,7 +122,7 @@ def _restored_value(hint: Any, value: Any) -> Any:
 
 
 def _require(value: Any, kind: Any) -> None:
-    """Raise TypeError for a value of another type; a truth value is not a number."""
+    """Raise TypeError for a value that is not of type `kind`; a truth value is not a number."""
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         raise TypeError(f"{value!r:.40} has another type than expected")
 

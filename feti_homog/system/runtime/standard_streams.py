@@ -132,9 +132,9 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Time a block as a stage of the run and of PETSc's log, and print its time.
+        """Time a `with` block as a stage of the run and of PETSc's log; print its time unless it raises.
 
-        The block may append remarks to the list, which are printed with the time.  This time excludes inner stages.
+        The block may append remarks to the yielded list, which are printed with the time.  Inner stages are excluded.
         """
         from petsc4py import PETSc
 
