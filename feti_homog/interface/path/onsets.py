@@ -40,18 +40,18 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset for a law and a bond state.  Collective."""
+        """Make the onset for the state of a law in the bond states.  Collective."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """Return the utilisation (p,) under tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
+        """Return the utilisation (p,) under tractions (p, c) at the nodes with indices (p,), 0 at debonded nodes."""
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the load factors f >= 0 (n, k) that break the first bonds under n traction rays.
+        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays, or inf.
 
-        Factors of other bonds are inf.  Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone
-        breaks nothing.  Utilisations under `direction` up to `noise`, (n,) or (n, k), count as zero.
+        Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations under
+        `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
@@ -80,8 +80,8 @@ class Onset:
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
     """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds.
-    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
+    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds. Without
+    convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
