@@ -38,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interface faults; phases `first` (n,) touch phases `second` (n,)."""
+    """List faults in `between` of interfaces; in the cell, phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
@@ -83,7 +83,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain a subdomain count that differs from the requested number."""
+    """Explain a subdomain count that differs from the requested number in one line; () without a difference."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -121,7 +121,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
-    """Note springs with a strength that are too soft to represent rigid bonds.
+    """List springs with a strength that are too soft to represent rigid bonds.
 
     `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r).  At 1 / 50, the limit
     of Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
@@ -139,7 +139,7 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
 
 
 def longest(ends: Float) -> float:
-    """Return the greatest length of edges with `ends` (e, 2, 2); 0 without edges."""
+    """Return the greatest length of e edges with end points `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
@@ -166,7 +166,7 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about cohesive laws, and about process zones that interface elements do not resolve.
+    """List warnings about cohesive laws, and about process zones that interface elements do not resolve.
 
     Args:
         width: cell width.
@@ -204,7 +204,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if the cohesive energy depends on the order of modes, and if teeth exceed the peak traction."""
+    """List warnings if the cohesive energy depends on the order of modes, or teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften

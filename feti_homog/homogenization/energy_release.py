@@ -52,7 +52,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the derivative of the energy with respect to the angle by which a crack tip turns.
+        """Return the derivative of the subdomain energy with respect to the angle by which a crack tip turns.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.
@@ -149,7 +149,7 @@ class EnergyReleaseRates:
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
-        """Return the energy release rates at all tips of a response.  Collective."""
+        """Return the energy release rates at all tips on circular interfaces of a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
@@ -178,7 +178,7 @@ class EnergyReleaseRates:
         )
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
-        """Return G (t,) from a virtual crack extension at each tip.  Collective."""
+        """Return G (t,) by a virtual crack extension at each tip, for the state before scaling.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, position = response.state.solution, self.bodies[tips.node], self.points[tips.node]
@@ -239,5 +239,5 @@ class EnergyReleaseRates:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """Shift offsets (..., 2) to their shortest periodic images."""
+    """Return offsets (..., 2) shifted to their shortest periodic images."""
     return np.asarray(offset - np.round(offset / period) * period)

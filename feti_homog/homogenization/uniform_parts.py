@@ -68,7 +68,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count the plane nodes in all parts of a subdomain; a shared node counts once in each part."""
+    """Count the plane nodes in all parts of a subdomain across materials; shared nodes count in each part."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -77,7 +77,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict a mesh to coarse triangles (t,); return the mesh and the original classes (c,)."""
+    """Return the mesh restricted to coarse triangles (t,), and the original numbers (c,) of its classes."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -103,7 +103,7 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """The multipliers that keep each part in equilibrium under given displacements."""
+    """The operator from displacements to the multipliers that keep each part in equilibrium."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble the coarse triangles at nodes that parts share.  Collective."""
@@ -124,7 +124,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """Return the multipliers lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,).  Collective."""
+        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,) and `loads` E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -137,7 +137,7 @@ class NestedInterior:
     Attributes:
         members: subdomains.
         mesh: joined mesh of the subdomains.
-        fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
+        fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids and prescribed side tractions.
@@ -170,7 +170,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Refine, assemble and factor this rank's subdomain interiors on a coarser lattice, by group."""
+    """Yield this rank's subdomain interiors, refined, assembled and factored on a coarser lattice, by group."""
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
@@ -194,7 +194,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield groups of consecutive one-phase subdomains, up to ELEMENTS_AT_ONCE elements."""
+    """Yield the indices of consecutive subdomains of one phase, with up to ELEMENTS_AT_ONCE elements if several."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)
