@@ -30,7 +30,7 @@ class Response:
         stress: (v,) Sigma = <sigma>, conjugate to E.
         scale: ratio of the response to `state`.
         stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
-        in_springs: spring energy, 1/2 sum lam^2 C / |UC|.
+        in_springs: spring energy per cell area; without friction 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
         checks: relative error in each law.
@@ -189,7 +189,7 @@ class Homogenization:
         return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Return the friction work per area, which the cell does not store.  Collective."""
+        """Return the friction work per area, which the cell does not store; 0 without friction.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump)

@@ -96,7 +96,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on cell sides, linear elements, teeth of `bonds` bonds (0: unknown), and the fibre fraction."""
+    """List remarks on cell sides, or on linear elements, teeth of `bonds` bonds (0: unknown) and the fibre fraction."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -123,8 +123,9 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 def soft_springs(case: Case, radii: Float) -> list[str]:
     """List springs with a strength that are too soft to represent rigid bonds.
 
-    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r).  At 1 / 50, the limit
-    of Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
+    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r), the ratio of the
+    matrix modulus in the plane state to spring stiffness and mean radius.  At 1 / 50, the limit of Turon et al. (Eng.
+    Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
     """
     lines, radii = list[str](), radii[np.isfinite(radii)]
     for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):

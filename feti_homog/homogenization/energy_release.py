@@ -111,9 +111,9 @@ class EnergyReleaseRates:
     """The energy release rates in a torn cell, response by response.
 
     Attributes:
-        interface: contact problem of the responses.
-        points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer and
-            inner constituents, interface sections, degrees about the centre of the inner constituent, lengths.
+        cell, interface: torn cell, and contact problem of the responses.
+        points, bodies: (n, 2) positions, and outer and inner constituents, at the interface nodes of all ranks.
+        pair, direction, length: (n,) interface sections, degrees about the inner constituent's centre, lengths.
         fibre, radius: (n,) fibre numbers, also within coatings, and circle radii, NaN without a circle.
     """
 

@@ -27,7 +27,7 @@ from feti_homog.typing import Float, Int
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """Mesh and cut the cell, and return this rank's part.  Collective; raises like `place_nodes` and `distribute`."""
+    """Mesh and cut the cell, and return this rank's part.  Collective; raises CaseError, MeshError on every rank."""
     noded = place_nodes(case, comm, policy.tiles)
     if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
         assert not isinstance(noded, CoarseMesh)
@@ -198,8 +198,8 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
     """Find the subdomain neighbours at this rank's edges.
 
-    Return both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this rank,
-    and the subdomain (k,) of this triangle.
+    Return both subdomains (n,) and (n,) at each edge between subdomains of this rank, the keys (k,) of edges with a
+    single triangle on this rank, except at voids, and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
     differs = subdomain[a] != subdomain[b]
@@ -224,7 +224,7 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
         and the number (constituents,) of coarse edges between each constituent and others.
 
     Raises:
-        CaseError: an interface is between phases that do not touch.
+        CaseError: an interface is between phases that do not touch, or that the cell lacks.
     """
     regions, around, curves = noded.regions, noded.lines.around, noded.lines.curves
     # The last entry of `constituent` is the matrix, to which MATRIX = -1 in `around` leads.

@@ -52,7 +52,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield each subdomain's parts, ordered by phase and body; `phase_of` (constituents,) names phases."""
     for number, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(number, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -106,7 +106,7 @@ class ForcesBetweenParts:
     """The operator from displacements to the multipliers that keep each part in equilibrium."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble the coarse triangles at nodes that parts share.  Collective."""
+        """Assemble stiffness K and load forces Q of the coarse triangles at nodes that parts share.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)

@@ -70,7 +70,7 @@ class Macroscopic:
 
 @dataclass(frozen=True)
 class Load:
-    """A load: n prescribed components, each a macroscopic strain or its conjugate stress, with a temperature change.
+    """A load of n components: each is a macroscopic strain or temperature change, or the conjugate stress.
 
     Attributes:
         values: (n,) strains and stresses.
@@ -91,7 +91,7 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Interpolate between this load and the load `end`.
+        """Interpolate between this load and the load `end`, which prescribes stresses in the same components.
 
         The result is (1 - share) load + share end; components that cancel are zero.
         """
@@ -198,10 +198,10 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Clip the strain sizes (m,) of a state to the range of the strains in `asked` (v,), as scales for errors.
+        """Return the load sizes (v,) of a state, the strains clipped by the strains of `asked` (v,), as scales.
 
-        The range is [`bound_ratio` `asked`, ABSURD times the largest strain in `asked`]; other loads remain.  The lower
-        bound matters where a path with friction returns to zero stress.
+        The range of a strain is [`bound_ratio` `asked`, ABSURD times the largest strain of `asked`].  The lower bound
+        matters where a path with friction returns to zero stress.
         """
         sizes, m = np.abs(strain), self.solver.problem.strains
         sizes[:m] = np.clip(sizes[:m], self.bound_ratio * asked[:m], ABSURD * self.imposed_strain(asked).max())
@@ -257,9 +257,9 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """Mark strains (v,) under prescribed stresses that contribute to a strain without stiffness.  Collective.
+    """Mark strains (v,) under prescribed stresses that a motion without stiffness changes.  Collective.
 
-    Such a strain only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
+    Such a motion only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
     stress.  `by_stress` (v,) marks prescribed stresses, `voigt` (v, v) is the stress integral of clamped bodies.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)

@@ -32,12 +32,12 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Combine bonded phases, in parallel along the fibres and in series across the fibres.
+    """Estimate the constants of bonded phases, in parallel along the fibres and in series across the fibres.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
 
-    with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A. Voigt
+    with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.  Voigt
     1889, Reuss 1929; expansions: Schapery 1968, with anisotropic fibres Hashin 1979.
     """
     if any(family.springs is not None for family in fibres):
@@ -149,10 +149,10 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants after Christensen and Lo, for one kind of fibres, also on springs.
+    """Estimate the constants by Christensen and Lo's method, for one kind of fibres, also on springs.
 
-    k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
-    E_T and nu_T follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
+    k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`; E_T and nu_T
+    follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING

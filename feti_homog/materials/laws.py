@@ -212,7 +212,7 @@ def _positive_definite(name: str, matrix: Float) -> Float:
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Return `known_compliance`.  Raises ValueError if the material is unstable, or incomplete for the plane state."""
+    """Return the compliance (6, 6) as `known_compliance`; ValueError if unstable, or incomplete for the plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):

@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield derivatives with respect to each given constant; in space, expansions last.  Raises as `stiffness_of`."""
+    """Yield derivatives by each given constant; by expansions only in space, and last.  Raises as `stiffness_of`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))

@@ -75,7 +75,8 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius."""
+    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, None if bonded.
+    """
 
     fraction: float
     constants: TransverseIsotropy
@@ -120,7 +121,7 @@ class Estimates:
 
 @dataclass(frozen=True)
 class ConductivityEstimates:
-    """Closed forms for the conductivity of composites whose phases conduct isotropically in the plane."""
+    """Closed forms for the conductivity of composites with phases that are isotropic in the plane."""
 
     axial: float = described("along the fibres: the mean, which is exact", "conductivity")
     wiener: Pair | None = described(
@@ -135,17 +136,17 @@ class ConductivityEstimates:
 
 
 def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
-    """Return the modulus 1 / sum c/(p + p0) - p0 of cylinders with `values` p in a medium with `reference` p0."""
+    """Return the modulus 1 / sum c/(p + p0) - p0 for cylinders with fractions c and moduli p in a medium p0."""
     return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
 
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Return Voigt's upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return Voigt's upper bound sum c_i C_i, (m, m), from fractions (n,) and stiffnesses (n, m, m)."""
     return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Return Reuss's lower bound (sum c_i C_i^-1)^-1, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return Reuss's lower bound (sum c_i C_i^-1)^-1, (m, m), from fractions (n,) and stiffnesses (n, m, m)."""
     return np.asarray(np.linalg.inv(voigt(fractions, np.linalg.inv(np.asarray(stiffnesses, dtype=float)))))
 
 

@@ -124,7 +124,7 @@ def von_mises(stress: Float, S33: Float) -> Float:
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """Return the principal stresses (m, 3) of [S11, S22, S12] (m, 3), S33 (m,), largest first; NaN where S33 is NaN."""
+    """Return the principal stresses (m, 3) of [S11, S22, S12] and S33 (m,), largest first; NaN where S33 is NaN."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]

@@ -63,7 +63,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        All multipliers at bonded nodes and, with contact, normal forces at closed nodes are active.
+        At debonded nodes only normal forces of closed nodes are active, with contact; all other multipliers are active.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -164,7 +164,7 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find the statuses and the solution under a load, from guesses.  Collective; raises like `linear`."""
+        """Find statuses and solution under a load, from guessed bonds.  Collective; raises like `linear`."""
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:

@@ -44,12 +44,12 @@ class CoupledInterfaces:
         return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
-        """Solve the dual problems at fixed statuses.  Collective; raises like `ContactProblem.linear`."""
+        """Solve the dual problems at fixed statuses, from multipliers `start`.  Collective; raises NotCarriedError."""
         triples = zip(self.problems, self.parts(load), start, strict=True)
         return tuple(problem.linear(part, bonds, lam) for problem, part, lam in triples)
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """Find the equilibrium under a load, from guesses.  Collective; raises like `ContactProblem.linear`."""
+        """Find the equilibrium under a load, from guessed bonds.  Collective; raises like `linear`."""
         loads = self.parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start[0])
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):

@@ -138,8 +138,8 @@ class FloatingBodies:
 
             (1 - w) before + w after + M a >= 0,   for the second fraction   >= -2 noise.
 
-        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt. Collective,
-        decided on rank 0; raises like `place`.
+        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt.
+        Collective, decided on rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 
@@ -165,7 +165,7 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of the step at which the first value (k,) reaches 0 and -2 noise.
+    """Return the fractions of a step at which the first value (k,) reaches 0 and -2 noise.
 
     Both fractions are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` is a number
     or (k,).

@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses and x: with all sliding faces stuck, with one face stuck, then by trial."""
+        """Yield other admissible statuses and x: from all sliding faces stuck, from one face stuck, then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -141,7 +141,7 @@ class StatusSearch:
         return None
 
     def _improved(self, status: Status, x: Float) -> Status:
-        """Return the statuses (n,) that the signs of the forces and jumps in x require."""
+        """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
         faces, allowed, slip, last = self.faces, self.allowed, self.load.slip, 2 * self.faces.nodes
         normal, tangential = faces.forces(x)
         noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip

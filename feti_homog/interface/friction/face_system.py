@@ -68,7 +68,7 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the factored response of `before` unless it fails to grow; see `FollowedStatuses.grow`."""
+        """Take over the factored response of `before` if it can grow; see `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored

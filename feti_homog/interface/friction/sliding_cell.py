@@ -145,6 +145,7 @@ class SlidingCell:
         interface: plane contact problem.
         friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged fraction of bonds.
         rows: (n,) global normal row of each face, in ascending order.
+        springs: (2n,) stiffness 1 / (C - C_0) of damaged bonds in both directions, 0 at debonded faces.
         faces: dense system of these faces, on every rank.
     """
 

@@ -78,7 +78,7 @@ class StatusSystem:
     A sliding node has the row S_t + s mu S_n, because the traction is s mu times the pressure.
 
     Attributes:
-        free: (m,) unknown entries of x.
+        free: (m,) mask of the unknown entries of x.
         sign: sign of the determinant, 0 with a free motion.
     """
 

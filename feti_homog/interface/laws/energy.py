@@ -34,8 +34,8 @@ RIGID = 1e-9
 class SpringEnergy(SpringLaw):
     """The law in which a bond breaks when its spring energy reaches the toughness.
 
-    G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I; G_I + G_II = G_c = G_Ic [1 + tan^2((1 -
-    lambda) psi)].
+        G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
+        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
 
     A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
 

@@ -37,7 +37,7 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the constants of a law by `value`, a function of keys; k_a defaults to the tangential stiffness."""
+    """Return the constants of a law by `value`, a function of keys; axial stiffness defaults to tangential."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
@@ -282,7 +282,7 @@ class ExponentialLaw(CohesiveLaw):
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral 1 - exp(-u)."""
+        """Return the integral int_0^u tau = 1 - exp(-u)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:

@@ -47,7 +47,7 @@ class Strength(BondLaw):
 
     @property
     def limits(self) -> Float:
-        """The strengths (3,) or (k, 3)."""
+        """The strengths [normal, tangential, axial], (3,) or (k, 3)."""
         return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
 
 

@@ -48,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Find the state at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
+        """Find the state at `begin`.  Collective; a leg from a waypoint reports its first change of statuses."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
@@ -160,7 +160,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the leg fraction that the cell carries, and the error that limits this fraction, or None."""
+            """Return the next leg fraction, and the error that limits it; None for all of `share`, even if stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -105,11 +105,11 @@ class Leg(ABC):
         return self._utilisation[1]
 
     def _is_overloaded(self) -> bool:
-        """Return whether a break or a contact change has overloaded bonds.  Collective."""
+        """Return whether the state has converged and has bonds beyond their strength.  Collective."""
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Yield a point and break the worst bonds until none is overloaded, once at least if `is_due`.  Collective."""
+        """Yield a point and break the worst bonds until none is overloaded, at least once if `is_due`.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)

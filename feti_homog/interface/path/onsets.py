@@ -28,10 +28,10 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """The first break in a cell with debonded faces that do not touch.
+    """The first break in a cell with debonded faces that do not touch, for one bond state.
 
     Attributes:
-        bonds: bond law at this rank's nodes in one bond state.
+        bonds: bond law at this rank's nodes in the bond state.
         bonded: (k,) nodes with a bond.
     """
 
@@ -40,7 +40,7 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset for the state of a law in the bond states.  Collective."""
+        """Take the law and the bonded nodes in a bond state.  Collective; raises like `BondLaw.in_state`."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
@@ -80,8 +80,8 @@ class Onset:
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
     """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds. Without
-    convexity, the first part of the step that ends with a utilisation above 1 is bisected.
+    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds.
+    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
