@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Number of halvings from which a mesh with two fewer gives the error, except across materials and if a phase locks.
+# Least number of halvings at which the coarser mesh has two fewer, except across materials and if a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on such a mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
 # coarse elements lock, and their errors say little about the fine mesh.

@@ -75,8 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, None if bonded.
-    """
+    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, or None."""
 
     fraction: float
     constants: TransverseIsotropy

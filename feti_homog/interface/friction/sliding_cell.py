@@ -144,8 +144,7 @@ class SlidingCell:
     Attributes:
         interface: plane contact problem.
         friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged fraction of bonds.
-        rows: (n,) global normal row of each face, in ascending order.
-        springs: (2n,) stiffness 1 / (C - C_0) of damaged bonds in both directions, 0 at debonded faces.
+        rows, springs: (n,) ascending global normal rows of faces, and (2n,) stiffnesses 1 / (C - C_0) of damaged bonds.
         faces: dense system of these faces, on every rank.
     """
 

@@ -14,7 +14,7 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
 
-# Difference below which fractions of a leg are equal.
+# Difference up to which fractions of a leg count as equal.
 SAME_SHARE = 1e-9
 
 

@@ -110,7 +110,7 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
     before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
     shares = [shares_to_zero(before, after, tension[in_contact])]
-    # Faces without contact overlap.
+    # Without contact, faces may overlap.
     is_open = (state.status == OPEN) & interface.contact
     before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
