@@ -107,7 +107,7 @@ class EstimatedNodes:
 def checked(
     case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
-    """Return the moved tips by interface, and the `faults` of the case followed by the faults of arcs.
+    """Return the moved tips by interface, and the `faults` followed by faults of arcs.
 
     Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
     select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.

@@ -197,7 +197,7 @@ class Homogenization:
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the largest error in a prescribed stress, relative to the largest stress, as in `Response.checks`."""
+        """Return the relative error in a prescribed stress, as in `Response.checks`."""
         load, scales = state.load, self.interface.scales
         # Roots of stiffnesses scale the stresses, so that all stresses have similar sizes.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)

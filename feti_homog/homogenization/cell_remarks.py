@@ -54,7 +54,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh, interfaces without effect or with soft springs, and nodes that never part.
+    """List remarks on a mesh, on ineffective interfaces, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
@@ -205,7 +205,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """List warnings if the cohesive energy depends on the order of modes, or teeth exceed the peak traction."""
+    """List warnings about energies that depend on the order of modes, and about teeth above the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften

@@ -90,7 +90,7 @@ class CellSummary:
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
-        """List a warning if nodes of a user's mesh were moved by more than rounding errors."""
+        """List a warning if a user's mesh was moved by more than rounding errors."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
         return [moved] if self.snapped > 64 * np.finfo(float).eps * (self.width + self.height) else []
 
@@ -253,7 +253,7 @@ def in_cell(points: Float, period: Float) -> Float:
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice, pinned: Int) -> int:
-    """Count the nodes at which two bodies could part along an interface, without the `pinned` node classes."""
+    """Count the nodes where two bodies could part along an interface, without `pinned` node classes."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     ends = np.unique(torus.edge_ends[between])

@@ -96,7 +96,7 @@ def components(plane: Float, *axial: Float) -> Float:
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """Join the components of the plane and the axial problem, or of conduction, to a vector (6,); None is zero."""
+    """Join the components of the problems, or of conduction, to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]

@@ -30,7 +30,7 @@ Largest = tuple[Float, Float]
 
 @dataclass(frozen=True)
 class RecoveredFields:
-    """The displacements and stresses of s states on this rank, and the largest stresses on all ranks.
+    """The fields of s states on this rank, and the largest stresses on all ranks.
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.

@@ -157,7 +157,7 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """Return int f f^T (mk + 1, mk + 1), f = [strains, 1]; in mixed elements r^2 / 2 less for 11 with 22."""
+        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1], less r^2 / 2 in products of 11 and 22."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22

@@ -106,7 +106,7 @@ class ForcesBetweenParts:
     """The operator from displacements to the multipliers that keep each part in equilibrium."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble stiffness K and load forces Q of the coarse triangles at nodes that parts share.  Collective."""
+        """Assemble stiffness K and load forces Q of the coarse triangles at shared nodes.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
@@ -132,11 +132,11 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of subdomains of one phase, on a coarser mesh with c displacements per node.
+    """The factored interior of subdomains of one phase on a coarser mesh.
 
     Attributes:
         members: subdomains.
-        mesh: joined mesh of the subdomains.
+        mesh: joined mesh of the subdomains, with c displacements per node.
         fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
@@ -194,7 +194,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield the indices of consecutive subdomains of one phase, with up to ELEMENTS_AT_ONCE elements if several."""
+    """Yield index groups of consecutive subdomains of one phase, up to ELEMENTS_AT_ONCE elements or one subdomain."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

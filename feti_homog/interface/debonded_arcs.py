@@ -79,9 +79,9 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the energy release rates (2,) in opening and in shear, at least 0, by closing the end of a crack.
+    """Return the energy release rates (2,) in opening and in shear, at least 0.
 
-    Irwin's integral over the closed length a is the work per length
+    Irwin's integral for closing the end of a crack, over the closed length a, is the work per length
 
         sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds
 
@@ -119,7 +119,7 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Find the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
+    """Find the tips that a mesh moves to a vertex at most `limit` degrees away.
 
     `marks` are tips from the function `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
     """
@@ -162,7 +162,7 @@ def debonded(
 
 
 def _end(arc: interface_section.Arc, half: float) -> float:
-    """Return the direction in [0, 360) of an arc end, at the signed angle `half` in degrees from the arc centre."""
+    """Return the direction in [0, 360) of an arc end.  `half` is its signed angle in degrees from the arc centre."""
     return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 

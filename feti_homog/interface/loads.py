@@ -60,10 +60,10 @@ class Macroscopic:
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
-        """Return the energy per cell area that a break to the state `after` releases at constant load.
+        """Return the energy per cell area that a break releases at constant load.
 
-        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state after the break; at
-        constant strain it is 1/2 E.(Sigma - Sigma').
+        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state `after` the break;
+        at constant strain it is 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
 
@@ -163,21 +163,21 @@ class LoadScales:
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """Return the scale of the stress in the bonded cell under loads (v,) of any sign, by Reuss' bound."""
+        """Return the scale of the stress in the bonded cell under loads (v,), by Reuss' bound."""
         m = self.solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
     @property
     def sign_noise(self) -> float:
-        """The relative size up to which a force, a gap or a stiffness may be the solver's error."""
+        """The relative size of forces, gaps and stiffnesses up to which they may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
-        """Return the size up to which a gap under loads `strain` (v,) may be the solver's error."""
+        """Return the largest gap under loads `strain` (v,) that may be the solver's error."""
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
-        """Return the sizes (k,) up to which the nodal forces may be the solver's error.  Collective.
+        """Return the largest nodal forces (k,) that may be the solver's error.  Collective.
 
         The error is relative to the largest force on the interface or, if larger, to the force that the imposed strain
         causes: errors in jumps change forces by the stiffness of the softer side.  Forces on other interfaces and
@@ -198,10 +198,10 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Return the load sizes (v,) of a state, the strains clipped by the strains of `asked` (v,), as scales.
+        """Return the load sizes (v,) of a state, clipped by `asked` (v,), as scales for errors.
 
-        The range of a strain is [`bound_ratio` `asked`, ABSURD times the largest strain of `asked`].  The lower bound
-        matters where a path with friction returns to zero stress.
+        The range of a strain is [`bound_ratio` `asked`, ABSURD times the largest strain of `asked`]; other loads stay.
+        The lower bound matters where a path with friction returns to zero stress.
         """
         sizes, m = np.abs(strain), self.solver.problem.strains
         sizes[:m] = np.clip(sizes[:m], self.bound_ratio * asked[:m], ABSURD * self.imposed_strain(asked).max())

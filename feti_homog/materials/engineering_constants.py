@@ -158,7 +158,7 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return the bulk modulus k and the shear modulus mu of the nearest isotropic plane stiffness.
+    """Return the bulk and shear moduli k and mu of the nearest isotropic plane stiffness.
 
     k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8, nearest in the Frobenius norm.  Both moduli
     are equal in all axes.
@@ -250,7 +250,7 @@ MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPAN
 
 
 class Constant(NamedTuple):
-    """The symbol and direction of a constant, and its names on a transversely isotropic material card."""
+    """Symbol and direction of a constant, and its names on a transversely isotropic material card."""
 
     symbol: str
     way: str

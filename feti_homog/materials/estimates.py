@@ -32,7 +32,7 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants of bonded phases, in parallel along the fibres and in series across the fibres.
+    """Estimate the constants of bonded phases, in parallel along and in series across the fibres.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
@@ -101,7 +101,7 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
-    """Return the volume fraction and the constants of the matrix and of each kind of fibres."""
+    """Return fraction and constants of the matrix, then of each kind of fibres."""
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 
@@ -136,11 +136,11 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants of similar cylinders that fill space, for one kind of fibres, also on springs.
+    """Estimate the constants of similar cylinders that fill space, for one kind of fibres.
 
     Each cylinder is a fibre coated by matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and expansions are exact for
-    this arrangement; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin
-    1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
+    this arrangement, also on springs; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic
+    fibres: Hashin 1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -149,7 +149,7 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants by Christensen and Lo's method, for one kind of fibres, also on springs.
+    """Estimate the constants for one kind of fibres, also on springs, by Christensen and Lo's method.
 
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`; E_T and nu_T
     follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.

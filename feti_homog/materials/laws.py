@@ -271,7 +271,7 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return a list of faults and a list of warnings about the contrast of stiffness or conductivity between phases."""
+    """Return the faults and the warnings about the contrast between phases, of stiffness or conductivity."""
     noun = "conductivities" if voigt.PLANE_STATES[plane].is_scalar else "stiffnesses"
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}

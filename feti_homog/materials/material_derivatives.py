@@ -71,7 +71,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC = -C dS C for each engineering constant, with the plane state's compliance S."""
+    """Yield name, value and dC = -C dS C for each engineering constant.  S is the plane state's compliance."""
     skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -89,7 +89,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC for each entry of a given stiffness, changed on both sides of the diagonal."""
+    """Yield name, value and dC for each entry of a given stiffness.  Entries ij and ji change together."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:
@@ -101,7 +101,7 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield the last part of the key, the value and dk (3, 3) for each conductivity in the cell's axes."""
+    """Yield name ending, value and dk (3, 3) for each conductivity in the cell's axes."""
     k = material.conductivity
     if isinstance(k, material_forms.FibreConductivity):
         yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])
@@ -116,7 +116,7 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Return the derivative of M, a stiffness or compliance with an imaginary step, reduced to a plane state.
+    """Return the derivative of M, a stiffness or compliance with an imaginary step, in a plane state.
 
     A spatial state takes the whole matrix, a plane state its block; the state `condensed` eliminates component 33.
     """

@@ -135,7 +135,7 @@ class ConductivityEstimates:
 
 
 def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
-    """Return the modulus 1 / sum c/(p + p0) - p0 for cylinders with fractions c and moduli p in a medium p0."""
+    """Return 1 / sum c/(p + p0) - p0: the modulus of cylinders with fractions c and moduli p in a medium with p0."""
     return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
 
 

@@ -106,7 +106,7 @@ def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
-    """Return the excess of twice the energy in damaged bonds on this rank over lam C lam.
+    """Return twice the energy in damaged bonds on this rank, minus lam C lam.
 
     Twice the energy, C_0 lam^2 + g^2 / (C - C_0), exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
     """

@@ -138,8 +138,8 @@ class FloatingBodies:
 
             (1 - w) before + w after + M a >= 0,   for the second fraction   >= -2 noise.
 
-        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt.
-        Collective, decided on rank 0; raises like `place`.
+        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt; if it never
+        is, both are 1.  Collective, decided on rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 
@@ -167,8 +167,7 @@ class FloatingBodies:
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
     """Return the fractions of a step at which the first value (k,) reaches 0 and -2 noise.
 
-    Both fractions are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` is a number
-    or (k,).
+    Both are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` may be (k,).
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
@@ -186,8 +185,7 @@ def _last_share(before: Float, after: Float, motion: Float, slack: float) -> flo
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
     """Maximize w within `bounds`, subject to motions a + last w <= limits, |a| <= LARGEST_MOTION; return x = (a, w).
 
-    Raises:
-        ConvergenceError: HiGHS found no solution.
+    Raises ConvergenceError if HiGHS finds no solution.
     """
     from scipy.optimize import linprog  # slow to import, and few cells have free fibres
 

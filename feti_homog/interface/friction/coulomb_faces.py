@@ -68,7 +68,7 @@ class StatusSearch:
         return result or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
-        """Search by at most `solves` pivots, and return the final statuses and x if the forces balance."""
+        """Search by at most `solves` pivots.  Return the final statuses and x if the forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 
@@ -126,7 +126,7 @@ class StatusSearch:
                 yield trial, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Search by pivots while friction rises in steps from zero to mu, each from the last statuses."""
+        """Search by pivots while friction rises in steps from zero to mu.  Steps start from the last statuses."""
         fraction, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:
@@ -187,7 +187,7 @@ class CoulombFaces(FaceSystem):
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Find the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
+        """Find the next statuses (n,), and the rate (m,) of the state x under a load rate (v,).
 
         Raises NotCarriedError and StuckError as `step` does.
         """
@@ -239,7 +239,7 @@ class CoulombFaces(FaceSystem):
         return allowed
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
-        """Return the time until a node leaves its status while x changes at `rate` per time; inf if no node does."""
+        """Return the time until a node leaves its status while x changes at `rate`; inf if no node does."""
         noise, closed = self.noise(rate), status != OPEN_FACE
         (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
         sticks, last = status == STICK, 2 * self.nodes
@@ -257,7 +257,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy lost on the straight path between states x at constant load, and the heat in it."""
+        """Return the lost energy and its heat on the straight path between states x at constant load."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -86,7 +86,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return the multipliers in owned rows (k, c), and store the columns of these rows for the next call."""
+        """Return the multipliers in owned rows (k, c).  Columns of these rows stay stored for the next call."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -222,7 +222,7 @@ class SlidingCell:
         return float(x @ self.faces.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
-        """Return the energy per area in the springs 1 / (C - C_0) of the damaged bonds in the plane."""
+        """Return the energy per area in the springs 1 / (C - C_0) of damaged bonds in the plane."""
         return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.cell.area)
 
     def _jumps_of(self, x: Float) -> Float:
@@ -261,9 +261,10 @@ class SlidingCell:
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
-        """Return the equilibrium in state x under the last of `loads`, certified on the scale of all.  Collective.
+        """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        `kkt_friction` is the largest of `coulomb_errors`, relative to the largest traction.
+        All `loads` scale the certificate; its `kkt_friction` is the largest of `coulomb_errors` over the largest
+        traction.
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()

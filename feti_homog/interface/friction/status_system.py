@@ -73,7 +73,7 @@ def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
 
 
 class StatusSystem:
-    """The factored system of the free rows, S x = rhs, with x prescribed in all other rows.
+    """The factored system S x = rhs of the free rows, with prescribed x in other rows.
 
     A sliding node has the row S_t + s mu S_n, because the traction is s mu times the pressure.
 
@@ -217,7 +217,7 @@ class FollowedStatuses:
         return np.asarray((self._R[0, :size, :size][:, columns] @ permuted[columns] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """Solve for x, from a start with the prescribed entries, and return x and S x (m,).
+        """Solve for x (m,) from a start with the prescribed entries; return x and S x.
 
         Return None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
         """

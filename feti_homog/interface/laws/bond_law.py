@@ -134,7 +134,7 @@ class BondLaw(ABC):
 
     @property
     def overshoot(self) -> float:
-        """The excess of the first break's traction over the peak of the law, relative to this peak."""
+        """The relative excess of the first break's traction over the peak of the law; 0 without teeth."""
         return 0.0
 
     def onset(self) -> BondLaw:
@@ -176,7 +176,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """A law for bonds that break at an energy of the undamaged springs, which depends on the mode.
+    """A law for bonds that break at a certain energy of the undamaged springs, by mode.
 
     A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 

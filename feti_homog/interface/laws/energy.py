@@ -103,9 +103,9 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """The law in which a bond at a tip breaks when the break releases G_c l, with tributary length l.
+    """The law in which bonds at tips break by the released energy.
 
-    All other bonds break when the spring energy reaches G_c.
+    A break at a tip releases G_c l, with tributary length l.  All other bonds break when the spring energy reaches G_c.
 
     Attributes:
         influence: inverse dual operator of the plane problem.

@@ -78,7 +78,7 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:
-        """Return the dataclass fields, by name, that describe the softening branch."""
+        """Return the dataclass fields, by name, that describe the softening branch; {} without any."""
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
@@ -118,7 +118,7 @@ class CohesiveLaw(SpringLaw):
     @property
     @abstractmethod
     def last(self) -> float:
-        """The argument u at the end of the last tooth, which takes all energy that remains."""
+        """The argument u at the end of the last tooth, which takes all remaining energy."""
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
@@ -240,7 +240,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the linear piece with a sign change."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u): on the linear piece with a sign change."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -259,7 +259,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law with a table of tractions over openings in mode I, stretched to the toughness in other modes."""
+    """A law by a table of tractions over openings in mode I.  Stretching adapts it to the toughness in other modes."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:

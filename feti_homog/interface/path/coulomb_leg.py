@@ -83,13 +83,13 @@ class CoulombLeg(Leg):
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the current statuses, x and macroscopic state, and add the energies since the last state."""
+        """Set the current statuses, x and macroscopic state.  Add the energies since the last state."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
@@ -109,13 +109,13 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to new statuses and scaled x, with energy losses per area."""
+        """Advance on a straight path to new statuses and scaled x.  Energy losses are per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Advance along the rates to the next change, the first break or the end of the leg; yield points.  Collective.
+        """Advance along the rates to the next change, break or end of the leg, and yield points.  Collective.
 
         Raises:
             NotCarriedError: the cell carries no more load; the last point is at the largest load.
@@ -153,9 +153,10 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance in one step to a leg fraction, or as far as the cell carries the load, and set `limit`.  Collective.
+        """Advance in one step to a leg fraction.  Collective.
 
-        Raises NotCarriedError if the cell carries no more load, and StuckError if no statuses are admissible.
+        If the cell carries only a part of the load, the step ends there and sets `limit`.  Raises NotCarriedError if it
+        carries no more load, and StuckError if no statuses are admissible.
         """
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 

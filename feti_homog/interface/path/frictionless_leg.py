@@ -77,7 +77,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to an equilibrium at a leg fraction, and add the energies since the last state."""
+        """Set the state at a leg fraction, and add the energies since the last state.  Collective."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds

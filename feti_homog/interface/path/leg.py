@@ -51,7 +51,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
@@ -109,7 +109,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Yield a point and break the worst bonds until none is overloaded, at least once if `is_due`.  Collective."""
+        """Yield a point and break the worst bonds, until none is overloaded.  Collective; `is_due`: at least once."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)
@@ -124,7 +124,7 @@ class Leg(ABC):
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, where bonds part and soften, and restart the sum of energies.  Collective."""
+        """Return the point at s, where bonds part and soften.  Collective; the sum of energies starts anew."""
         energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)

@@ -28,7 +28,7 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """The first break in a cell with debonded faces that do not touch, for one bond state.
+    """The first break in one bond state, where debonded faces do not touch.
 
     Attributes:
         bonds: bond law at this rank's nodes in the bond state.
@@ -78,10 +78,10 @@ class Onset:
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
-    """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
+    """Return the fraction of a step at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds.
-    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
+    The step leads from tractions `before` (k, c) to `after`.  A convex utilisation passes 1 at a single point, which
+    bisection finds; without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
@@ -96,11 +96,11 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of a step where contact begins to change, and where it surely has changed.
+    """Return the fractions of a step where contact begins to change, and surely has changed.
 
-    Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens
-    when its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when
-    the fibre has no more room (because gaps are not unique).  Collective.
+    Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens when
+    its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the
+    fibre has no more room (because gaps are not unique).  Collective.
     """
     solver, nodes = interface.solver, interface.nodes
     tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
