@@ -46,10 +46,7 @@ class CondensedProblem:
     """
 
     def __init__(self, interface: ContactProblem) -> None:
-        """Compute the response of the bonded cell to unit loads.  Collective.
-
-        Raises CaseError if the solver has no inverse of the dual operator.
-        """
+        """Compute the response of the bonded cell to unit loads.  Collective; raises CaseError without an inverse."""
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
             raise CaseError(solver_plan.WITHOUT_INVERSE)

@@ -105,7 +105,8 @@ class TipEnergies:
 class ReleasedEnergy(SpringEnergy):
     """The law in which bonds at tips break by the released energy.
 
-    A break at a tip releases G_c l, with tributary length l.  All other bonds break when the spring energy reaches G_c.
+    A bond at a tip breaks when this releases G_c l, with tributary length l; others, when the spring energy reaches
+    G_c.
 
     Attributes:
         influence: inverse dual operator of the plane problem.
