@@ -24,7 +24,7 @@ TIP_TRIANGLES = 2.0
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return the directions of all tips by curve number (`BareOutline.of`)."""
+    """Return the sorted tip directions in degrees by curve: fibre n from 0, or ~n for the curve within a coating."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {phase_names.COATING, phase_names.MATRIX} & set(
@@ -36,14 +36,15 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips / cell width; None means the size on interfaces.
+    """Return the element size at tips / cell width; None for the size on interfaces.
 
     Without `tip_size` in the case, the size follows from the ratio R of the mean fibre radius to the cell width,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    at most `interface_size`.  With several openings it may be larger, so that tips add at most TIP_TRIANGLES times the
-    triangles of the mesh.  Along paths, and so in envelopes, tips move: only `tip_size` then sets a size.
+    at least LEAST_SIZE, at most `interface_size`.  With several openings it may be larger, so that tips add at most
+    TIP_TRIANGLES times the triangles of the mesh.  Along paths, and so in envelopes, tips move: only `tip_size` then
+    sets a size.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
@@ -60,7 +61,10 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """The interface nodes (k,) on rank 0 before refinement: fibre number from 1, interface, direction in degrees."""
+    """The interface nodes (k,) on rank 0 before refinement: fibre number from 1, interface, direction in degrees.
+
+    `is_vertex` (k,) marks vertices of coarse triangles.
+    """
 
     fibre: Int
     pair: Int
@@ -69,7 +73,7 @@ class EstimatedNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
-        """Place nodes on chords that may debond, except vertices that never part.
+        """Place nodes on the chords that may debond, except vertices that never part.
 
         `pairs` are as in `share_entities`; `numbers` (constituents,) are fibre numbers.
         """
@@ -90,7 +94,7 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return the tips that the mesher moved to vertices, by interface; none in a user's mesh."""
+        """Return a mapping of the tips that the mesher moved to vertices for each interface; empty in a user's mesh."""
         if case.cell.has_own_mesh:
             return ({},) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
@@ -104,7 +108,7 @@ class EstimatedNodes:
 def checked(
     case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
-    """Return the moved tips by interface, and the `faults` of the case followed by the faults of arcs.
+    """Return the moved tips by interface, and the `faults` followed by faults of arcs.
 
     Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
     select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.

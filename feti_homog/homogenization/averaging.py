@@ -30,7 +30,7 @@ class Response:
         stress: (v,) Sigma = <sigma>, conjugate to E.
         scale: ratio of the response to `state`.
         stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
-        in_springs: spring energy, 1/2 sum lam^2 C / |UC|.
+        in_springs: spring energy per cell area; without friction 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
         checks: relative error in each law.
@@ -73,7 +73,7 @@ class Response:
 
     @property
     def solution(self) -> DualSolution:
-        """The dual solution of the response."""
+        """The dual solution times `scale`, except for the amplitudes and the residual."""
         state = self.state.solution
         return replace(state, strain=self.all_loads, lam=self.scale * state.lam, jump=self.scale * state.jump)
 
@@ -113,9 +113,7 @@ class Homogenization:
         """Solve the unit-cell problem under each strain, and average.  Collective.
 
         Strains are (k, v); `bonds` has debonded nodes and a first guess of contact; `starts` are initial multipliers.
-
-        Raises:
-            ConvergenceError: a solve broke down and left no numbers.
+        Raises ConvergenceError if a solve breaks down and leaves no numbers.
         """
         if self.interface.is_linear(bonds.status):
             return [self.response(state, 1.0) for state in self.interface.equilibria(strains, bonds, starts)]
@@ -126,9 +124,7 @@ class Homogenization:
         """Average an equilibrium, multiplied by `scale`.  Collective.
 
         If `brief`, a state without kernel amplitudes is averaged from its multipliers, and only the contact is checked.
-
-        Raises:
-            ConvergenceError: the numbers of the state are not finite.
+        Raises ConvergenceError if the numbers of the state are not finite.
         """
         if not np.isfinite(state.solution.residual):
             raise ConvergenceError(
@@ -181,7 +177,7 @@ class Homogenization:
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
-        """Multiply a state by `scale`; `energy` is twice the stored energy of the state per cell area.  Collective."""
+        """Return the response of a state times `scale`; `energy` is twice the state's energy per area.  Collective."""
         means = scale * state.solution.strain[: len(stress)], scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         errors, damage = checks | state.certificate, self.damage(state.bonds)
@@ -193,7 +189,7 @@ class Homogenization:
         return (bonds.status != Contact.BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Return the friction work per area, which the cell does not store.  Collective."""
+        """Return the friction work per area, which the cell does not store; 0 without friction.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
         work = float(state.solution.lam @ state.solution.jump)
@@ -201,7 +197,7 @@ class Homogenization:
         return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the largest error in a prescribed stress, relative to the largest stress.  Collective."""
+        """Return the relative error in a prescribed stress, as in `Response.checks`."""
         load, scales = state.load, self.interface.scales
         # Roots of stiffnesses scale the stresses, so that all stresses have similar sizes.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
@@ -210,7 +206,7 @@ class Homogenization:
         return float(error / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
-        """Count the interface nodes in each contact state.  Collective."""
+        """Count the nodes of all ranks in each contact state: `bonded`, `open` and `closed`.  Collective."""
         if self.cell.summary.across:  # without multipliers no bond can break
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
@@ -219,7 +215,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """The matrix nu = (B B^T)^-1 B N (owned rows, m), with int eps* = nu^T B u."""
+        """The matrix nu = (B B^T)^-1 B N (owned rows, m), with int eps* = nu^T B u.  Collective when first read."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -267,25 +263,25 @@ class FibreInterfaces:
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
     def length(self, which: Bool) -> Float:
-        """Sum the interface length of each fibre (f,) over the nodes `which` (k,).  Collective."""
+        """Sum the interface length of each fibre (f,) over the nodes in the mask `which` (k,).  Collective."""
         sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
         return distributed_arrays.allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
-        """List the fibres without any intact bond, numbered from 1.  Collective."""
+        """List the numbers, from 1, of fibres with an interface but no intact bond.  Collective."""
         is_loose = (self.length(status == Contact.BONDED) == 0.0) & (self._length > 0.0)
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert interface lengths (f,) to degrees, or to fractions of 360 for fibres that are not round."""
+        """Convert interface lengths (f,) to degrees; fractions of 360 unless fibres are round and uncoated."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the ratio of the summed lengths (f,) to the whole interface length."""
+        """Return the ratio of the summed lengths (f,) to the whole interface length; 0 without interfaces."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
-        """Return the debonded length fraction (i,) of each [[interface]] section.  Collective."""
+        """Return the debonded length fraction (i,) of each [[interface]] section, 0 without nodes.  Collective."""
         length, debonded = (
             np.bincount(self._nodes.pair, values, self._pairs).astype(float)
             for values in (self._nodes.length, self._nodes.length * (status != Contact.BONDED))

@@ -38,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List interface faults; phases `first` (n,) touch phases `second` (n,)."""
+    """List faults in `between` of interfaces; in the cell, phases `first` (n,) touch phases `second` (n,)."""
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
@@ -54,7 +54,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh, interfaces without effect or with soft springs, and nodes that never part.
+    """List remarks on a mesh, on ineffective interfaces, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
@@ -83,7 +83,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain a subdomain count that differs from the requested number."""
+    """Explain a subdomain count that differs from the requested number in one line; () without a difference."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -96,7 +96,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on cell sides, linear elements, teeth of `bonds` bonds (0: unknown), and the fibre fraction."""
+    """List remarks on cell sides, or on linear elements, teeth of `bonds` bonds (0: unknown) and the fibre fraction."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -121,10 +121,11 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
-    """Note springs with a strength that are too soft to represent rigid bonds.
+    """List springs with a strength that are too soft to represent rigid bonds.
 
-    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r).  At 1 / 50, the limit
-    of Turon et al. (Eng. Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
+    `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r), the ratio of the
+    matrix modulus in the plane state to spring stiffness and mean radius.  At 1 / 50, the limit of Turon et al. (Eng.
+    Fract. Mech. 74, 2007, 1665), epoxy with 30 to 60 % of fibres loses 2.5 to 10 % of C11.
     """
     lines, radii = list[str](), radii[np.isfinite(radii)]
     for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):
@@ -139,7 +140,7 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
 
 
 def longest(ends: Float) -> float:
-    """Return the greatest length of edges with `ends` (e, 2, 2); 0 without edges."""
+    """Return the greatest length of e edges with end points `ends` (e, 2, 2); 0 without edges."""
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
@@ -166,7 +167,7 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """Warn about cohesive laws, and about process zones that interface elements do not resolve.
+    """List warnings about cohesive laws, and about process zones that interface elements do not resolve.
 
     Args:
         width: cell width.
@@ -204,7 +205,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """Warn if the cohesive energy depends on the order of modes, and if teeth exceed the peak traction."""
+    """List warnings about energies that depend on the order of modes, and about teeth above the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften

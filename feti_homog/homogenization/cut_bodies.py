@@ -70,7 +70,7 @@ class SharedVertices:
                 self.is_first.append(np.repeat(edge_copies[number][on_cut, 1] == 1, line.shape[1] - 1))
 
     def sum(self, parts: Sequence[Float]) -> list[Float]:
-        """Sum values (n, k) at each mesh's shared vertices over all pieces.  Collective."""
+        """Sum values (n, k) at each mesh's shared vertices over all pieces; return the sums by mesh.  Collective."""
 
         def sums(number: Int, values: Float) -> Float:
             totals = np.zeros((int(number.max(initial=-1)) + 1, values.shape[1]))
@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count the copies of each row (n, 3) in all meshes, and mark the first copy.  Collective."""
+        """Count the copies of each row (n, 3) in all meshes, and mark the first copy with 1: (n, 2).  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -95,7 +95,7 @@ class SharedVertices:
     ) -> list[Array]:
         """Combine the values (n, k) of equal rows (n, 3) on home ranks.  Collective.
 
-        `combine` takes the values and one number per row, the same for equal rows.  Results are split like `parts`.
+        `combine` takes the values and one number per row, equal for equal rows.  Results are split like `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
         rows, values, source, position = distributed_arrays.exchange(
@@ -174,7 +174,7 @@ class _Strip:
 
     @classmethod
     def of(cls, body: stress_recovery.RecoveredStress, classes: Int, cut: Int, is_first: Bool) -> _Strip:
-        """Find the elements about the shared vertices `classes`.
+        """Find the elements within LAYERS layers about the shared vertices `classes`.
 
         Among the sides along a `cut` (c, 2), this piece counts only the sides marked by `is_first`.
         """
@@ -208,14 +208,14 @@ class _Strip:
 
 
 def _code(a: Int, b: Int, size: int) -> Int:
-    """Assign a number to each unordered pair of vertices, among `size` vertices."""
+    """Return one number for each unordered pair of vertices (n,), among `size` vertices."""
     return np.asarray(np.minimum(a, b) * size + np.maximum(a, b))
 
 
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Add the moments and sums `pairs` (vertices, p, ..) of all pieces at shared vertices.  Collective."""
+    """Sum the moments and sums in `pairs` (vertices, p, ..) over pieces at shared vertices, in place.  Collective."""
     parts = [np.concatenate([a[s.shared], b[s.shared]], axis=2) for s, (a, b) in zip(strips, pairs, strict=True)]
     totals = shared.sum([part.reshape(len(part), -1) for part in parts])
     for strip, (moments, sums), part, total in zip(strips, pairs, parts, totals, strict=True):

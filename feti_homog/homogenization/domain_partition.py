@@ -67,7 +67,7 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the cell has several subdomains that are not whole bodies."""
+        """Whether several subdomains share a body or, across materials, the cell."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property
@@ -86,11 +86,11 @@ class CellSummary:
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """Return the fibre numbers (k,) of constituents (k,)."""
+        """Return the fibre numbers (k,) of the constituents with indices (k,)."""
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
-        """Warn if nodes of a user's mesh were moved by more than rounding errors."""
+        """List a warning if a user's mesh was moved by more than rounding errors."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
         return [moved] if self.snapped > 64 * np.finfo(float).eps * (self.width + self.height) else []
 
@@ -105,7 +105,7 @@ class RankShare:
     """The part of the cut cell on one rank.
 
     Attributes:
-        summary, table: data of the whole cell.
+        summary, table: data of the whole cell and of its subdomains.
         pairs: (phases, phases) as in `cell_remarks.pairs_of`.
         submeshes: the rank's submeshes.
     """
@@ -123,7 +123,7 @@ def distribute(
     n_ranks: int,
     policy: partition_policy.PartitionPolicy = partition_policy.DEFAULT_POLICY,
 ) -> list[RankShare]:
-    """Cut the cell, and deal the subdomains to the ranks.
+    """Cut the cell on one rank, and return the part of each rank.
 
     Raises CaseError on interface faults, or if an arc lies on a fibre that cannot have arcs, or selects no node.
     """
@@ -179,7 +179,7 @@ def distribute(
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize a tiled cell with given numbers of subdomains and coarse triangles."""
+    """Summarize a tiled cell with these numbers of subdomains and coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     solid = np.flatnonzero((inside := regions.constituent[:-1]) >= 0)
     circle = solid[np.unique(inside[solid], return_index=True)[1]]
@@ -237,7 +237,7 @@ def _cut_across(
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
     """Return the distance between the fibres and the matched table; None without a table.
 
-    `centres` are (n, 2), and `radii` are (n,).
+    Fibres have centres (n, 2) and radii (n,).
     """
     if (window := case.cell.matched) is None:
         return None
@@ -247,13 +247,13 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Shift points (k, 2) into [0, period), where points close to the period go to 0."""
+    """Shift points (k, 2) by periods into [0, period); points close to the period move to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice, pinned: Int) -> int:
-    """Count the nodes at which two bodies could part along an interface, without the `pinned` classes."""
+    """Count the nodes where two bodies could part along an interface, without `pinned` node classes."""
     first, second, edge = torus.sides
     between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     ends = np.unique(torus.edge_ends[between])

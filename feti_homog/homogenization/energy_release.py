@@ -52,11 +52,11 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the derivative of the energy with respect to the angle by which a crack tip turns.
+        """Return the derivative of the subdomain energy by the angle of a turning crack tip.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.
-            reach: distance beyond which no node turns.
+            reach: distance beyond which no node turns; without a node within it, the derivative is 0.
             u: (dofs,) displacements u*.
             E: (2, 2) macroscopic strain.
         """
@@ -111,9 +111,9 @@ class EnergyReleaseRates:
     """The energy release rates in a torn cell, response by response.
 
     Attributes:
-        interface: contact problem of the responses.
-        points, bodies, pair, direction, length: (n, 2) and (n,) at all ranks' interface nodes: positions, outer and
-            inner constituents, interface sections, degrees about the centre of the inner constituent, lengths.
+        cell, interface: torn cell, and contact problem of the responses.
+        points, bodies: (n, 2) positions, and outer and inner constituents, at the interface nodes of all ranks.
+        pair, direction, length: (n,) interface sections, degrees about the inner constituent's centre, lengths.
         fibre, radius: (n,) fibre numbers, also within coatings, and circle radii, NaN without a circle.
     """
 
@@ -149,7 +149,7 @@ class EnergyReleaseRates:
         self._boundaries = self._gathered(np.concatenate(points)), self._gathered(np.concatenate(body))
 
     def of(self, response: Response) -> EnergyRelease:
-        """Return the energy release rates at all tips of a response.  Collective."""
+        """Return the energy release rates at all tips on circular interfaces of a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
         tips = self._chains.tips(status)
         # Tips on circles, in the order of fibres, interfaces and directions.
@@ -178,7 +178,7 @@ class EnergyReleaseRates:
         )
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
-        """Return G (t,) from a virtual crack extension at each tip.  Collective."""
+        """Return G (t,) by a virtual crack extension at each tip, for the state before scaling.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, position = response.state.solution, self.bodies[tips.node], self.points[tips.node]
@@ -239,5 +239,5 @@ class EnergyReleaseRates:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """Shift offsets (..., 2) to their shortest periodic images."""
+    """Return offsets (..., 2) shifted to their shortest periodic images."""
     return np.asarray(offset - np.round(offset / period) * period)

@@ -61,7 +61,7 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """The smallest error (k, k) that remains where `elements` and `arcs` cancel."""
+        """The smallest error (k, k) if `elements` and `arcs` of opposite signs cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
@@ -76,7 +76,7 @@ class EnergyErrors:
 def energy_errors(
     cell: TornCell, responses: Sequence[Response], contact: bool = False, keep: bool = True, nested: bool | None = None
 ) -> EnergyErrors:
-    """Estimate the mesh errors of responses in one problem.  Collective.
+    """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
         contact: whether faces touch.
@@ -106,7 +106,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return the ratios of element and arc errors to errors on a lattice `fewer` halvings coarser.  Collective."""
+    """Return the ratios of element and arc errors to such errors on a mesh `fewer` halvings coarser.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -207,10 +207,10 @@ class Group(NamedTuple):
 def boundary_tractions(
     cell: TornCell, responses: Sequence[Response], groups: Sequence[Group], shared: SharedVertices | None, nested: bool
 ) -> dict[int, local_fits.KnownTractions]:
-    """Return the known tractions of each group, at arcs and voids.  Collective.
+    """Return the known tractions by group number, at arcs and voids; groups without any have no entry.  Collective.
 
-    Tractions at voids are zero.  At a node between two sides of an arc the traction is the force divided by
-    the node length if the mesh is `nested`, else by the side length, so that uniform stresses give exact tractions.
+    Tractions at voids are zero.  At a node between two sides of an arc the traction is the force divided by the node
+    length if the mesh is `nested`, else by the side length, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last

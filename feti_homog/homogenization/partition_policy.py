@@ -49,8 +49,8 @@ class PartitionPolicy:
     """The rules for default piece counts.  Sizes are degrees of freedom after refinement.
 
     Attributes:
-        piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the
-            dense matrices.
+        piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the dense
+            matrices.
         piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
         cut_factor: ratio of a bonded body to a piece, by size or boundary, above which the body is cut.
         even_cut_factor, even_share: `even_cut_factor` replaces `cut_factor` for bodies up to the fraction `even_share`
@@ -59,14 +59,14 @@ class PartitionPolicy:
             often that uncut bodies pay off while the dense matrices of their boundaries are small.
         tiles: rules for the tiles of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body; so are
-            label images of any size, whose bodies have long boundaries; 0 for no such cuts.
+            label images of any size, because their bodies have long boundaries; 0 for no such cuts.
         across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
         whole_ranks: largest number of ranks with one piece per rank across materials; the Schur complements are
             factored together, and are too large for more ranks.
-        strip_dofs: cells from this size on are halved into strips.  Smaller cells have short boundaries anyway, and
-            the irregular cuts of METIS make their estimated mesh errors depend less on the direction.
+        strip_dofs: cells from this size on are halved into strips.  Smaller cells have short boundaries anyway, and the
+            irregular cuts of METIS make their estimated mesh errors depend less on the direction.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
     `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
@@ -86,7 +86,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
-        """Return the piece count, a multiple of `n_ranks`, of a cut across materials; 0 for other cuts."""
+        """Return the piece count for a cut across materials, a multiple of `n_ranks`; 0 if cuts follow bodies."""
         if not self.across_dofs or (dofs > self.across_dofs and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -122,7 +122,7 @@ def can_be_cut_across(case: Case) -> bool:
 def wanted_pieces(
     case: Case, load: Int, edges: Int, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> Int:
-    """Choose the piece count (b,) of each body.
+    """Choose the piece count (b,) of each of b bodies.
 
     The case determines the counts, or else the policy, which gives each rank at least one piece.
 
@@ -181,7 +181,7 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
     """Estimate the memory of the largest rank after all bonds break, in bytes.
 
-    `few` is the memory of this rank before bonds break.
+    `few` is this memory before bonds break; `columns` of all `multipliers` have influence columns.
     """
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
@@ -198,7 +198,7 @@ def recommended_ranks(dofs: int, bodies: int) -> int:
 
 
 def in_words(size: float) -> str:
-    """Format a number of bytes in MiB or GiB."""
+    """Format a number of bytes in MiB, or in GiB from 1000 MiB on."""
     size /= 2**20
     digits = 1 if size < 10 else 0
     return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"

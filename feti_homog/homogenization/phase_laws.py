@@ -1,8 +1,8 @@
 """Choose the problems on the plane mesh, with their phase stiffnesses, springs and bond strengths.
 
-In generalized plane strain the plane problem has the loads e = [E11, E22, gamma12, E33, T] with a temperature change
-T, and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] followed
-by the conjugate of T, and 1/2 e.A e is the stored energy.
+In generalized plane strain the plane problem has the loads e = [E11, E22, gamma12, E33, T] with a temperature change T,
+and the stiffness A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] followed by
+the conjugate of T, and 1/2 e.A e is the stored energy.
 """
 
 import math
@@ -34,7 +34,7 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
 
 def law(case: Case, phase: str, problem: Problem) -> Float:
-    """Return the phase stiffness or conductivity A (v, v) in a problem."""
+    """Return the phase stiffness or conductivity A (v, v) for the loads of a problem."""
     material = case.material_of(phase)
     if problem in (PLANE, CONDUCTION):
         return (
@@ -58,7 +58,7 @@ def is_mixed(case: Case, phase: str) -> bool:
 
 
 def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tuple[Float, ...]:
-    """Differentiate `law` in the plane problem and, if present, in the axial problem.
+    """Differentiate `law` in each of the `problems`: one or two derivatives (v, v).
 
     `dC` and `expansion` (6,) are the derivatives of the stiffness and the expansion of the phase.
     """
@@ -91,12 +91,12 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """Join the strain or stress components of each problem: (3,) or, with an axial problem, (6,)."""
+    """Join the strain or stress components of the problems: (3,), or (6,) with an axial problem."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """Join the components of the plane and the axial problem, or of conduction, to a vector (6,); None is zero."""
+    """Join the components of the problems, or of conduction, to a vector (6,); None is zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -106,9 +106,9 @@ def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
 
 
 def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSprings:
-    """Return the springs of a problem; by default axial springs have the tangential stiffness.
+    """Return the springs of a problem at all interfaces; by default axial springs have the tangential stiffness.
 
-    The springs of conduction are conductances.
+    The springs of conduction are conductances.  Missing stiffnesses are infinite.
     """
     along = [
         (bond.conductance or bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces
@@ -118,12 +118,12 @@ def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSpri
 
 
 def has_softening(case: Case) -> bool:
-    """Return whether the bond law changes the bonds' compliance."""
+    """Return whether damage in the bond law changes the compliance of bonds; false without an interface."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens
 
 
 def has_springs(case: Case) -> bool:
-    """Return whether any bond has a finite stiffness."""
+    """Return whether any interface has a finite stiffness or conductance."""
     stiffnesses = (*springs(case).stiffness, *springs(case, AXIAL).stiffness)
     return any(math.isfinite(stiffness) for row in stiffnesses for stiffness in row)
 
@@ -148,5 +148,5 @@ def strength_factors(case: Case, fibres: int) -> Float:
 
 
 def has_process_zone(case: Case) -> bool:
-    """Return whether elements must resolve the length along which bonds break."""
+    """Return whether elements must resolve the length along which bonds break; false without an interface."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].has_process_zone

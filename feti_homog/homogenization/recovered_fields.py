@@ -30,10 +30,10 @@ Largest = tuple[Float, Float]
 
 @dataclass(frozen=True)
 class RecoveredFields:
-    """The displacements and stresses of s states on this rank, and the largest stresses on all ranks.
+    """The fields of s states on this rank, and the largest stresses on all ranks.
 
     Attributes:
-        displacement: u* (dofs, s) of the parts in each problem; 0 without a response.
+        displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
         stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; fluxes replace the axial shears.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
             hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
@@ -112,7 +112,7 @@ def error_shares(cell: TornCell, response: Response) -> Float:
 
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
-    """Name the places at which stresses of plane states grow without limit on finer meshes."""
+    """Name the places at which stresses of plane states would grow without limit on finer meshes."""
     corners = np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any()
     rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
     tips = rigid and any(plane is not None and plane.debonded > 0 < plane.counts["bonded"] for plane in states)
@@ -170,7 +170,7 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of the values (n, v) at points (n, v or 1, 2); ties take the first by x, then y."""
+    """Find the largest of the values (n, v) and their points (n, v or 1, 2); ties take the first by x, then y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
         tied = points[column >= top - TIE * abs(top), number % points.shape[1]]
@@ -180,5 +180,5 @@ def _largest(values: Float, points: Float) -> Largest:
 
 
 def _joined(parts: Mapping[str, Sequence[Largest]]) -> dict[str, Largest]:
-    """Find the largest values of the parts of each phase; a phase without parts has no entry."""
+    """Find the largest values over the parts of each phase; a phase without parts has no entry."""
     return {phase: _largest(*map(np.stack, zip(*largest, strict=True))) for phase, largest in parts.items() if largest}

@@ -19,7 +19,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """The element sides along springs, and the interface nodes of all ranks, for all states."""
+    """The element sides along springs on this rank, and the interface nodes of all ranks."""
 
     def __init__(
         self,

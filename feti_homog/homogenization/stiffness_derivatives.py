@@ -39,7 +39,7 @@ class Derivative:
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
         value: value of the constant.
-        energies: (v, v) derivatives of the stresses under the unit loads of each problem.
+        energies: for each problem, the derivatives (v, v) of the stresses under its unit loads.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate the stiffness with respect to all constants, from the responses to unit loads.  Collective."""
+    """Differentiate the stiffness with respect to all constants, by responses to unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
@@ -145,7 +145,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Compute the fields in elements from nodes (e, a), u (e, a, c, k) and loads (m, k)."""
+        """Compute the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = shape_functions.MixedElements.of(points, s.L) if s.is_mixed else None
         g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -157,7 +157,7 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1]."""
+        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1], less r^2 / 2 in products of 11 and 22."""
         *points, _, k = self.strain.shape
         gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22
@@ -189,7 +189,7 @@ class _Fields:
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
-    """Return the strains (e, q, m, k) of slopes (e, q, 2, c, k)."""
+    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
@@ -203,7 +203,7 @@ def _gram(fields: Float, weights: Float) -> Float:
 
 
 def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fibre fraction if the cell is a lattice of equal, uncoated, bonded fibres."""
+    """Yield the fibre fraction if the cell is a lattice of equal, uncoated, bonded fibres; else nothing."""
     cell = case.cell
     is_bare = cell.geometry in cell_section.LATTICES and cell.coating is None and not case.interfaces
     if is_bare and cell.fibre_fraction is not None:

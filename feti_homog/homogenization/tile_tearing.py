@@ -27,7 +27,7 @@ from feti_homog.typing import Float, Int
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """Mesh and cut the cell, and return this rank's part.  Collective."""
+    """Mesh and cut the cell, and return this rank's part.  Collective; raises CaseError, MeshError on every rank."""
     noded = place_nodes(case, comm, policy.tiles)
     if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
         assert not isinstance(noded, CoarseMesh)
@@ -90,7 +90,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
 
 
 def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """Fill the tiles on all ranks, and join the mesh on rank 0.  Collective.
+    """Fill the tiles on all ranks, and join the mesh on rank 0; None on others.  Collective.
 
     Raises:
         MeshError: on every rank, if a rank cannot fill a tile.
@@ -106,7 +106,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
 
 def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[tuple[int, tile_filling.Tile]]:
-    """Deal the tiles on rank 0; return the numbers and tiles of this rank.  Collective."""
+    """Deal the `tiles` of rank 0 to all ranks; return the numbers and tiles of this rank.  Collective."""
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
     for k, rank in enumerate(distributed_arrays.balanced(loads, comm.size).tolist()):
@@ -115,7 +115,7 @@ def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[
 
 
 def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile_filling.Filling]]:
-    """Fill numbered tiles.  Raises MeshError if gmsh cannot fill a tile."""
+    """Fill tiles, and return the fillings with the tile numbers.  Raises MeshError if gmsh cannot fill a tile."""
     return [(k, tile_filling.fill(tile)) for k, tile in tiles]
 
 
@@ -183,7 +183,7 @@ def tear_by_tiles(
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """Cut this rank's triangles (m,) into subdomains, numbered by constituent, then by tile."""
+    """Cut this rank's triangles (m,) into subdomains (m,), numbered by constituent, then by tile."""
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = periodic_topology.components(len(tile), a[within], b[within])
@@ -198,8 +198,8 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
     """Find the subdomain neighbours at this rank's edges.
 
-    Return both subdomains (n,) and (n,) at each edge inside the rank, the edges (k,) with one triangle on this rank,
-    and the subdomain (k,) of this triangle.
+    Return both subdomains (n,) and (n,) at each edge between subdomains of this rank, the keys (k,) of edges with a
+    single triangle on this rank, except at voids, and the subdomain (k,) of this triangle.
     """
     a, b, _ = torus.sides
     differs = subdomain[a] != subdomain[b]
@@ -210,7 +210,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """Assign a rank to each subdomain (s,), given the `neighbours` of all ranks."""
+    """Assign a rank to each subdomain (s,) with `load` (s,), by the `neighbours` of all ranks."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
@@ -224,7 +224,7 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
         and the number (constituents,) of coarse edges between each constituent and others.
 
     Raises:
-        CaseError: an interface is between phases that do not touch.
+        CaseError: an interface is between phases that do not touch, or that the cell lacks.
     """
     regions, around, curves = noded.regions, noded.lines.around, noded.lines.curves
     # The last entry of `constituent` is the matrix, to which MATRIX = -1 in `around` leads.

@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 
 # Number of elements in a group of subdomains: small enough for the processor's cache, large enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
-# Number of halvings from which a mesh with two fewer gives the error, except across materials and if a phase locks.
+# Least number of halvings at which the coarser mesh has two fewer, except across materials and if a phase locks.
 REFINED_OFTEN = 3
 # Largest lambda / mu on such a mesh, and in subdomains across materials: the value at Poisson's ratio 0.4.  Above it,
 # coarse elements lock, and their errors say little about the fine mesh.
@@ -52,7 +52,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield the parts of all subdomains, ordered by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield each subdomain's parts, ordered by phase and body; `phase_of` (constituents,) names phases."""
     for number, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(number, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -68,7 +68,7 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Count the plane nodes in all parts of a subdomain; a shared node counts once in each part."""
+    """Count the plane nodes in all parts of a subdomain across materials; shared nodes count in each part."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
     last = np.empty(len(s.mesh.points), np.int64)
     last[nodes] = body
@@ -77,7 +77,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Restrict a mesh to coarse triangles (t,); return the mesh and the original classes (c,)."""
+    """Return the mesh restricted to coarse triangles (t,), and the original numbers (c,) of its classes."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -103,10 +103,10 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """The multipliers that keep each part in equilibrium under given displacements."""
+    """The operator from displacements to the multipliers that keep each part in equilibrium."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble the coarse triangles at nodes that parts share.  Collective."""
+        """Assemble stiffness K and load forces Q of the coarse triangles at shared nodes.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
@@ -124,7 +124,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """Return the multipliers lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,).  Collective."""
+        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,) and `loads` E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -132,12 +132,12 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of subdomains of one phase, on a coarser mesh with c displacements per node.
+    """The factored interior of subdomains of one phase on a coarser mesh.
 
     Attributes:
         members: subdomains.
-        mesh: joined mesh of the subdomains.
-        fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
+        mesh: joined mesh of the subdomains, with c displacements per node.
+        fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids and prescribed side tractions.
@@ -170,7 +170,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Refine, assemble and factor this rank's subdomain interiors on a coarser lattice, by group."""
+    """Yield this rank's subdomain interiors, refined, assembled and factored on a coarser lattice, by group."""
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
@@ -194,7 +194,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield groups of consecutive one-phase subdomains, up to ELEMENTS_AT_ONCE elements."""
+    """Yield index groups of consecutive subdomains of one phase, up to ELEMENTS_AT_ONCE elements or one subdomain."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

@@ -55,7 +55,7 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """The first degree of freedom of each part in this rank's vectors."""
+        """The first degree of freedom of each part in this rank's vectors, and their length."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
@@ -83,7 +83,7 @@ class TornCell:
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Extend the boundary displacements to the displacements u* of each part.
+        """Yield each part with its displacements u*, extended from the boundary displacements.
 
         `u` is (boundary dofs, k), `loads` are (v, k), and u* is (dofs, k); `keep` stores the factors.
         """
@@ -144,7 +144,7 @@ class TornCell:
 
     @cached_property
     def directions(self) -> Float:
-        """The directions (k,) in degrees from fibre centres to this rank's interface nodes."""
+        """The directions (k,) in degrees from fibre centres to this rank's interface nodes; NaN without a centre."""
         from feti_homog.interface import debonded_arcs
 
         nodes = self.solver.jump_operator.nodes
@@ -158,11 +158,11 @@ class TornCell:
 
     @cached_property
     def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
-        """The interiors of this rank's subdomains on the coarser mesh."""
+        """The interiors of this rank's subdomains on the coarser mesh.  Collective when first read."""
         return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
-        """Mark this rank's initially debonded nodes (k,); `opening` is the default angle of arcs."""
+        """Return the mask (k,) of this rank's initially debonded nodes; arcs without an angle take `opening`."""
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)
@@ -189,7 +189,7 @@ class TornCell:
         return {phase: area / total for phase, area in areas.items()}
 
     def destroy(self) -> None:
-        """Free the solvers.  Collective."""
+        """Free the solvers of all problems.  Collective."""
         for cell in self.problems:
             cell.solver.destroy()
 
@@ -203,8 +203,7 @@ def tear(
 ) -> TornCell:
     """Tear the cell of a case, and factor the subdomains.  Collective.
 
-    Raises:
-        CaseError, MeshError: on every rank.
+    Raises CaseError and MeshError, on every rank, like `tile_tearing.cut`; `progress` reports the stages.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
@@ -230,7 +229,7 @@ def tear(
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """Assemble this rank's subdomains for displacements along the fibres."""
+    """Assemble this rank's subdomains for displacements along the fibres, on the meshes of `subdomains`."""
     laws = [_laws(case, summary, s.submesh, AXIAL) for s in subdomains]
     return [
         Subdomain.on(s.submesh, s.mesh, L, AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer)
@@ -241,9 +240,9 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
-    """Mesh, cut and refine the cell, and assemble the subdomains.  Collective.
+    """Mesh, cut and refine the cell, and assemble the subdomains.  Collective; raises like `tear`.
 
-    Returns the part of the cell on this rank, its shared entities, the lattice and the subdomains.  Raises like `tear`.
+    Return this rank's part of the cell, its shared entities, the lattice and this rank's subdomains.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
@@ -274,7 +273,7 @@ def assemble_subdomains(
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
-    """Return the phase stiffnesses of a subdomain, in the shape for `assemble`."""
+    """Return the phase stiffnesses of a subdomain: (v, v), or (phases, v, v) across materials."""
     laws = np.stack([phase_laws.law(case, phase, problem) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 

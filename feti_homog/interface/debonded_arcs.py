@@ -29,7 +29,7 @@ class InterfaceChains:
     """The chains of interface nodes, by the neighbours along the interface.
 
     Attributes:
-        neighbours: (n, 2) neighbours of each node, -1 unless the node has two.
+        neighbours: (n, 2) neighbours of each node, both -1 unless the node has exactly two.
     """
 
     def __init__(self, adjacency: csr_matrix) -> None:
@@ -39,7 +39,7 @@ class InterfaceChains:
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
 
     def tips(self, status: Status) -> CrackTips:
-        """Return the tips for node states (n,): bonded nodes with one debonded neighbour."""
+        """Return the crack tips for node states (n,): bonded nodes with exactly one debonded neighbour."""
         has_two = self.neighbours[:, 0] >= 0
         debonded = (status != BONDED)[self.neighbours] & has_two[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
@@ -74,18 +74,18 @@ class CrackTips:
     ahead: Int
 
     def chosen(self, which: Int | Bool) -> CrackTips:
-        """Return the tips selected by an index or a mask."""
+        """Return the tips that an index or a mask selects."""
         return CrackTips(self.node[which], self.behind[which], self.ahead[which])
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the energy rates (2,) from closing the last part of a crack.
+    """Return the energy release rates (2,) in opening and in shear, at least 0.
 
-    Irwin's integral over the length a of this part is the work per length
+    Irwin's integral for closing the end of a crack, over the closed length a, is the work per length
 
-        sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds,
+        sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds
 
-    in opening and in shear, at least zero.
+    of forces F (tractions t) at distances s ahead of the tip on jumps w behind the tip.
 
     Args:
         length: closed length a.
@@ -98,7 +98,7 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 
 
 def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
-    """Return the tip directions in [0, 360), by fibre number from 0.
+    """Return the sorted tip directions in [0, 360) of each fibre with tips, by fibre number from 0.
 
     An arc without an angle takes every opening in `values`.  Openings of 0 and 360 degrees have no tips.
     """
@@ -112,16 +112,16 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """Return the directions (k,) of points (k, 2) about fibre centres, in (-180, 180]; NaN without a centre."""
+    """Return the directions (k,) of periodic points (k, 2) about the centres of fibres (k,), in [-180, 180], or NaN."""
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Find the tips that a mesh moves to the nearest vertex, at most `limit` degrees away.
+    """Find the tips that a mesh moves to a vertex at most `limit` degrees away.
 
-    `marks` are tips as returned by `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
+    `marks` are tips from the function `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
     """
     moved = {}
     for number, ends in marks.items():
@@ -137,10 +137,10 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Mark the nodes (k,) within debonded arcs.
+    """Return the mask (k,) of nodes within debonded arcs.
 
-    Nodes lie on fibres (k,), numbered from 1, in directions `angle` (k,).  Arcs without an angle take `opening`;
-    `moved` are the tips that the mesh has moved.
+    Nodes lie on fibres (k,), numbered from 1, in directions `angle` (k,); `moved` are the tips that the mesh has moved.
+    Arcs without an angle take `opening`.  Raises ValueError if such an arc has no opening.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:
@@ -162,7 +162,7 @@ def debonded(
 
 
 def _end(arc: interface_section.Arc, half: float) -> float:
-    """Return the direction in [0, 360) of an arc tip, at the signed angle `half` from the arc centre."""
+    """Return the direction in [0, 360) of an arc end.  `half` is its signed angle in degrees from the arc centre."""
     return round(arc.centre + half, DIRECTION_DIGITS) % 360.0
 
 

@@ -48,7 +48,7 @@ class Macroscopic:
 
     @property
     def stored(self) -> float:
-        """The stored energy E.Sigma / 2, per cell area."""
+        """The energy E.Sigma / 2 per cell area that the cell stores with fixed bonds."""
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
@@ -56,13 +56,13 @@ class Macroscopic:
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
-        """Return the load of this state, with stresses in the components `by_stress` (n,), else strains."""
+        """Return the load with this state's stresses in the components `by_stress` (n,), strains in others."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
-        """Return the energy that a break releases at constant load.
+        """Return the energy per cell area that a break releases at constant load.
 
-        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state after the break;
+        Work minus the change of stored energy is 1/2 (E'.Sigma - E.Sigma'), where ' marks the state `after` the break;
         at constant strain it is 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
@@ -70,7 +70,7 @@ class Macroscopic:
 
 @dataclass(frozen=True)
 class Load:
-    """A load: prescribed values of n macroscopic strains, with a temperature change, or of stresses.
+    """A load of n components: each is a macroscopic strain or temperature change, or the conjugate stress.
 
     Attributes:
         values: (n,) strains and stresses.
@@ -82,16 +82,16 @@ class Load:
 
     @classmethod
     def strain(cls, values: Float) -> Load:
-        """Make the load that prescribes strains (n,)."""
+        """Make the load that prescribes strains (n,) in all components."""
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
-        """Split the load into parts with given numbers of components."""
+        """Split the load into consecutive parts with `sizes` components."""
         ends = np.cumsum(sizes)[:-1]
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Interpolate between this load and the load `end`.
+        """Interpolate between this load and the load `end`, which prescribes stresses in the same components.
 
         The result is (1 - share) load + share end; components that cancel are zero.
         """
@@ -146,14 +146,14 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return the largest of `values` (k,) on the interface of every node, but at least 0.  Collective."""
+        """Return the largest of `values` (k,) on each node's interface and all ranks, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return np.asarray(largest[inner])
 
     def bond_stress(self, loads: Float) -> Float:
-        """Bound the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
+        """Return the scale of the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
@@ -163,21 +163,21 @@ class LoadScales:
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """Return a lower bound for the stress in the bonded cell under loads (v,) of any sign."""
+        """Return the scale of the stress in the bonded cell under loads (v,), by Reuss' bound."""
         m = self.solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
     @property
     def sign_noise(self) -> float:
-        """The relative size up to which a force, a gap or a stiffness may be the solver's error."""
+        """The relative size of forces, gaps and stiffnesses up to which they may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
-        """Return the size up to which a gap may be the solver's error."""
+        """Return the largest gap under loads `strain` (v,) that may be the solver's error."""
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
-        """Return the sizes (k,) up to which the nodal forces may be the solver's error.  Collective.
+        """Return the largest nodal forces (k,) that may be the solver's error.  Collective.
 
         The error is relative to the largest force on the interface or, if larger, to the force that the imposed strain
         causes: errors in jumps change forces by the stiffness of the softer side.  Forces on other interfaces and
@@ -198,8 +198,9 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Clip the strain sizes (v,) of a state to [`bound_ratio` `asked`, ABSURD max(`asked`)], as scales for errors.
+        """Return the load sizes (v,) of a state, clipped by `asked` (v,), as scales for errors.
 
+        The range of a strain is [`bound_ratio` `asked`, ABSURD times the largest strain of `asked`]; other loads stay.
         The lower bound matters where a path with friction returns to zero stress.
         """
         sizes, m = np.abs(strain), self.solver.problem.strains
@@ -207,13 +208,14 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,)."""
+        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,), or 0."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
         """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell.
 
-        Loads after the first v follow from the first v, and do not count.
+        Entries after the first v, stresses of cells with tractions on the sides, follow from the first v and do not
+        count.
         """
         return np.asarray(self._strains @ np.abs(loads[: self._strains.shape[1]]))
 
@@ -221,10 +223,8 @@ class LoadScales:
 def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
-    Strains that no stiffness resists stay zero if their stresses are below the noise.
-
-    Raises:
-        NotCarriedError: no stiffness resists the stresses.
+    Strains that no stiffness resists stay zero if their stresses are below the solver's error.  Raises NotCarriedError
+    if no stiffness resists the stresses.
     """
     solver = scales.solver
     if not (load.by_stress.any() and load.values.any()):
@@ -257,10 +257,10 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """Mark strains (v,) under prescribed stresses that contribute to a strain without stiffness.  Collective.
+    """Mark strains (v,) under prescribed stresses that a motion without stiffness changes.  Collective.
 
-    Such a strain only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
-    stress.  `voigt` (v, v) is the stress integral of clamped bodies.
+    Such a motion only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
+    stress.  `by_stress` (v,) marks prescribed stresses, `voigt` (v, v) is the stress integral of clamped bodies.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]

@@ -1,7 +1,8 @@
 """Compute the named constants of a stiffness, and describe their symbols and axes.
 
 Stiffnesses C are (3, 3) in Voigt order [11, 22, 12], or (6, 6) in the order [11, 22, 33, 23, 13, 12] with x3 along the
-fibres, with engineering shears, in any stress unit.  Expansions (6,) are strains per unit of temperature.
+fibres, with engineering shears, in any stress unit.  Expansions (6,) are strains per unit of temperature.  The index A
+means axial, T transverse.
 
 Axes 1, 2, 3 of a cell are x1 and x2, across the fibres, and x3, along them.  Axes 1, 2, 3 of a ply, of data sheets and
 of cards are x3, x1, x2: names with `axial`, `transverse`, `x1` or `x2` are the same in both.
@@ -30,8 +31,8 @@ _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (
 class Moduli:
     """Moduli in the plane; in plane strain E and nu belong to the plane state, not to the bulk material.
 
-    nu_ij = -eps_j/eps_i under stress along i; eta_i = gamma_12/eps_i under this stress (mutual influence);
-    `bulk` and `shear` belong to the nearest isotropic stiffness, and `anisotropy` is the relative distance to it.
+    nu_ij = -eps_j/eps_i and eta_i = gamma_12/eps_i (mutual influence) under stress along i; `bulk` and `shear` belong
+    to the nearest isotropic stiffness, and `anisotropy` is the relative distance to it.
     """
 
     E1: float = described("Young's modulus along x1", records.STRESS)
@@ -92,9 +93,9 @@ class TransverseModuli:
 def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     """Tabulate the constants of a stiffness C, real or complex, by name.
 
-    The table has Cij of the upper triangle, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with S = C^-1;
-    in space also the nearest transversely isotropic constants (`about_fibres`) and, from the stress `heat` (6,) under a
-    unit temperature, normal thermal stresses and strains.  Raises numpy.linalg.LinAlgError if C is singular.
+    The table has Cij of the upper triangle without COUPLINGS, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with
+    S = C^-1; in space also the constants of `about_fibres` and, from the stress `heat` (6,) under a unit temperature,
+    normal thermal stresses, free strains and their mean across.  Raises numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
@@ -120,7 +121,7 @@ def _along_axes(S: Array) -> dict[str, Any]:
 
 
 def about_fibres(C: Array) -> dict[str, Any]:
-    """Tabulate the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
+    """Tabulate the constants of the transversely isotropic stiffness nearest to C, (6, 6) real or complex.
 
     The nearest stiffness in the Frobenius norm is the mean of C and C^T over all turns about x3, with Hill's moduli
 
@@ -143,7 +144,7 @@ def about_fibres(C: Array) -> dict[str, Any]:
 
 
 def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: float) -> tuple[float, float]:
-    """Return both constants E_T and nu_T: 4/E_T = 1/k + 1/m + 4 nu_A^2/E_A and nu_T = E_T/(2 m) - 1 (Hill 1964)."""
+    """Return E_T and nu_T: 4/E_T = 1/bulk + 1/shear + 4 nu_A^2/E_A and nu_T = E_T/(2 shear) - 1 (Hill 1964)."""
     E_transverse = 4 / (1 / bulk + 1 / shear + 4 * nu_axial**2 / E_axial)
     return E_transverse, E_transverse / (2 * shear) - 1
 
@@ -159,8 +160,8 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
     """Return the bulk and shear moduli k and mu of the nearest isotropic plane stiffness.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8,
-    nearest in the Frobenius norm.  Both moduli are equal in all axes.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8, nearest in the Frobenius norm.  Both moduli
+    are equal in all axes.
     """
     c = np.asarray(stiffness, dtype=float)
     bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
@@ -169,19 +170,19 @@ def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:
-    """Return the isotropic stiffness (3, 3): C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
+    """Return the isotropic stiffness (3, 3) with bulk k and shear mu: C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
     plus, minus = bulk + shear, bulk - shear
     return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return the distance ||C - C_iso|| / ||C|| to the nearest isotropic stiffness, equal in all axes."""
+    """Return the distance ||C - C_iso|| / ||C|| to the nearest isotropic plane stiffness, equal in all axes."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
 
 def _distance(C: Float, nearest: Float) -> float:
-    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses as tensors."""
+    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses in the Frobenius norm of tensors."""
     scale = _MANDEL[len(C)]
     return float(np.linalg.norm(scale * (C - nearest)) / np.linalg.norm(scale * C))
 
@@ -195,7 +196,7 @@ def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
 def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverseIsotropy:
     """Return the nearest transversely isotropic constants, with `deviation` = ||C - C_nearest|| / ||C||.
 
-    The mean over all turns, as in `about_fibres`, has the expansions alpha_33 and (alpha_11 + alpha_22)/2.
+    The mean over all turns, as in `about_fibres`, has the expansions alpha_33 and (alpha_11 + alpha_22)/2, or None.
     """
     c = np.asarray(stiffness, dtype=float)
     table = {name: float(value) for name, value in about_fibres(c).items()}
@@ -208,7 +209,7 @@ def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | Non
 
 
 def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
-    """Return the stiffness C (6, 6) of transversely isotropic constants.
+    """Return the stiffness C (6, 6) of constants with k = K_transverse and m = G_transverse.
 
     C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m.
     """
@@ -222,15 +223,15 @@ def transversely_isotropic_stiffness(constants: TransverseIsotropy) -> Float:
 
 
 def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
-    """Return whether the stiffness with these constants is transversely isotropic, up to rounding."""
+    """Return whether the stiffness behind these constants is transversely isotropic, up to rounding."""
     return constants.deviation < ISOTROPY
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """Return the ranges of the moduli E and G over the directions n across x3.
+    """Return the ranges of the moduli E and G over DIRECTIONS directions n across x3.
 
-    1/E = sigma:S:sigma with sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to n and x3.
-    Raises numpy.linalg.LinAlgError if the stiffness is singular.
+    1/E = sigma:S:sigma with the compliance S and sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to
+    n and x3.  Raises numpy.linalg.LinAlgError if the stiffness is singular.
     """
     angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     c, s, zero = np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)
@@ -249,7 +250,7 @@ MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPAN
 
 
 class Constant(NamedTuple):
-    """The symbol and direction of a constant, and its names on a transversely isotropic material card."""
+    """Symbol and direction of a constant, and its names on a transversely isotropic material card."""
 
     symbol: str
     way: str
@@ -289,7 +290,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names that mean something else in a ply, such as `S12`; '' without such names."""
+    """Describe the axes of names with another meaning in a ply, such as `S12`; '' without such names."""
     bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
     return ". ".join(
         f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"

@@ -1,7 +1,8 @@
 """Estimate the constants of a unidirectional composite by closed formulas from phases and fractions.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
-across the fibres and bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
+across the fibres and bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.  Methods return
+NOTHING, with all constants None, for unsupported springs or numbers of fibre kinds.
 """
 
 import dataclasses
@@ -21,9 +22,9 @@ MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
     """Estimate the constants of fibres in a matrix by each method.
 
-    The rule of mixtures and Mori and Tanaka's estimate hold for several kinds of fibres, the other methods for one;
-    only the last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic
-    about x3, nor an expansion if a phase has no expansion.
+    The rule of mixtures and Mori and Tanaka's estimate allow several kinds of fibres, the other methods one; only the
+    last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic about x3, nor
+    an expansion if a phase has no expansion.
     """
     if not all(map(engineering_constants.is_transversely_isotropic, [matrix, *(f.constants for f in fibres)])):
         return Estimates(**dict.fromkeys(METHODS, NOTHING))
@@ -31,13 +32,13 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Combine any number of phases, in parallel along the fibres and in series across the fibres.
+    """Estimate the constants of bonded phases, in parallel along and in series across the fibres.
 
         E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
         alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
 
-    with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.
-    Voigt 1889, Reuss 1929; expansions: Schapery 1968, with anisotropic fibres Hashin 1979.
+    with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.  Voigt
+    1889, Reuss 1929; expansions: Schapery 1968, with anisotropic fibres Hashin 1979.
     """
     if any(family.springs is not None for family in fibres):
         return NOTHING
@@ -49,7 +50,7 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
 
 
 def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants for one kind of fibres by Chamis's simplified equations.
+    """Estimate the constants except k for one kind of bonded fibres by Chamis's simplified equations.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
@@ -71,13 +72,12 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
 
 
 def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants for one kind of fibres by Halpin and Tsai's equations.
+    """Estimate the constants for one kind of bonded fibres by Halpin and Tsai's equations.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
 
-    with xi = 2 for E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, where G_m is across the fibres.
-    Only E_T is fitted, so that E_T/(2 G_T) - 1 may exceed 1: the estimate has no nu_T.
-    Halpin and Kardos 1976.
+    with xi = 2 for M = E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, where G_m is across the fibres.
+    Only E_T is fitted, so that E_T/(2 G_T) - 1 may exceed 1: nu_T and expansions are None.  Halpin and Kardos 1976.
     """
     if len(fibres) != 1 or fibres[0].springs is not None:
         return NOTHING
@@ -101,13 +101,13 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
-    """Return the volume fraction and the constants of the matrix and of each kind of fibres."""
+    """Return fraction and constants of the matrix, then of each kind of fibres."""
     rest = 1 - sum(family.fraction for family in fibres)
     return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
 
 
 def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
-    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; alpha if all phases have expansions."""
+    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; expansions None unless all phases have both."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0
@@ -120,7 +120,7 @@ def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[s
 
 
 def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
-    """Estimate constants by `aligned_cylinders` in the matrix, with `equivalent_fibre` for fibres on springs."""
+    """Estimate the constants by `aligned_cylinders` with the matrix as medium, and `equivalent_fibre` for fibres."""
     fractions = [c for c, _ in _phases(matrix, fibres)]
     phases = [matrix, *(phase_bounds.equivalent_fibre(family, matrix) for family in fibres)]
     return phase_bounds.aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
@@ -136,11 +136,11 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 
 
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants of similar cylinders that fill space, for one kind of fibres, also on springs.
+    """Estimate the constants of similar cylinders that fill space, for one kind of fibres.
 
     Each cylinder is a fibre coated by matrix.  By `cylinders_in_matrix`, k, E_A, nu_A, G_A and expansions are exact for
-    this arrangement; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic fibres: Hashin
-    1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
+    this arrangement, also on springs; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic
+    fibres: Hashin 1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING
@@ -149,10 +149,10 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 
 
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
-    """Estimate the constants after Christensen and Lo, for one kind of fibres, also on springs.
+    """Estimate the constants for one kind of fibres, also on springs, by Christensen and Lo's method.
 
-    k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
-    E_T and nu_T follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
+    k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`; E_T and nu_T
+    follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
     """
     if len(fibres) != 1:
         return NOTHING

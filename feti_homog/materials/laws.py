@@ -1,7 +1,7 @@
 """Derive the plane and spatial stiffness and the expansion of each phase, and check the stiffness contrast.
 
 The Voigt order is [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears.  x3 is normal
-to a plane of symmetry of every phase, so 23 and 13 couple only with each other.
+to a plane of symmetry of every phase, so 23 and 13 couple only with each other.  Each ValueError names keys at fault.
 """
 
 import math
@@ -27,7 +27,7 @@ NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
 }
 """Optional constants that each plane state needs."""
 OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
-# Relative deviation, by rounding, up to which a material counts as isotropic or transversely isotropic.
+# Relative deviation, due to rounding, up to which a material counts as isotropic or transversely isotropic.
 ISOTROPY = 1e-9
 # Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.
 NOISE = 1e-9
@@ -37,9 +37,9 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: material_forms.Material, plane: str) -> Float:
-    """Return the stiffness: (3, 3) in the plane, (6, 6) in a spatial plane state; in conduction, `conductivity`.
+    """Return the stiffness, (3, 3) or in generalized plane strain (6, 6); in conduction, the conductivity (3, 3).
 
-    Raises like `plane_stiffness`.
+    Raises ValueError as `conductivity`, `plane_stiffness` and `spatial_stiffness` do.
     """
     if voigt.PLANE_STATES[plane].is_scalar:
         return conductivity(material)
@@ -49,8 +49,8 @@ def stiffness_of(material: material_forms.Material, plane: str) -> Float:
 def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
     """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
 
-    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0. Raises
-    ValueError, with the keys at fault, if the constants do not determine C or belong to no stable material.
+    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0.  Raises
+    ValueError if the constants do not determine C, contradict each other or belong to no stable material.
     """
     material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
@@ -72,10 +72,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3): q = -k grad T in the cell's axes, symmetric positive definite.
-
-    Raises ValueError, with the key at fault, for a missing conductivity, and for a matrix that is not SPD.
-    """
+    """Return k (3, 3): q = -k grad T in the cell's axes.  Raises ValueError if k is missing or not SPD."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
@@ -87,7 +84,7 @@ def conductivity(material: material_forms.Material) -> Float:
 def isotropic_ratio(material: material_forms.Material) -> float | None:
     """Return Poisson's ratio of an isotropic material; None for other materials, and for a given stiffness.
 
-    A transversely isotropic material is isotropic if its constants are isotropic up to ISOTROPY.
+    Transversely isotropic constants count as isotropic up to ISOTROPY.  Raises ValueError as `transverse_ratio` does.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
         young, ratio, shear = material.E_transverse, transverse_ratio(material), material.G_axial
@@ -101,7 +98,7 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
 def spatial_stiffness(material: material_forms.Material) -> Float:
     """Return C (6, 6): S = C E in the cell's axes, symmetric positive definite, in stress units.
 
-    Raises ValueError as `plane_stiffness` does.
+    Raises ValueError as `plane_stiffness` does, and for a given stiffness (3, 3).
     """
     material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
@@ -120,9 +117,9 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
 
 
 def expansion(material: material_forms.Material) -> Float | None:
-    """Return the free strains (6,) per unit of temperature in the cell's axes; None if the case has no expansion.
+    """Return the free strains (6,) per unit of temperature in the cell's axes; None if the material gives none.
 
-    Raises ValueError, with the keys at fault, if expansions are given twice or incompletely.
+    Raises ValueError if expansions are given twice or incompletely.
     """
     free = material.expansion
     if isinstance(material, material_forms.TransverselyIsotropic):
@@ -144,7 +141,7 @@ def expansion(material: material_forms.Material) -> Float | None:
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
     """Return the rows s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain.  Rows that the constants do not determine are NaN.
+    s is zero in plane stress, e in plane strain; undetermined rows are NaN.  Raises ValueError for invalid constants.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     material = _elastic(material)
@@ -164,14 +161,14 @@ def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, 
 
 
 def _elastic(material: material_forms.Material) -> material_forms.Elastic:
-    """Return a material with a stiffness; ValueError for a conductor."""
+    """Return the material unchanged.  Raises ValueError for a conductor, which has no stiffness."""
     if isinstance(material, material_forms.Conductor):
         raise ValueError('young, poisson: missing; conductivity alone serves [analysis] type = "conductivity"')
     return material
 
 
 def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]:
-    """Return Lame's constant, reduced in plane stress, and the shear modulus."""
+    """Return Lame's constant, reduced in plane stress, and the shear modulus; ValueError if the first is infinite."""
     state = voigt.PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
@@ -181,12 +178,12 @@ def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]
 
 
 def _angle(material: material_forms.Material) -> float:
-    """Return the angle from x1 to the first material axis, in degrees, positive towards x2."""
+    """Return the angle from x1 to the first material axis in degrees, positive towards x2; 0 unless orthotropic."""
     return material.angle if isinstance(material, material_forms.Orthotropic) else 0.0
 
 
 def _checked_stiffness(material: material_forms.General) -> Float:
-    """Check and return the given stiffness of a phase, (3, 3) or (6, 6).  Raises ValueError."""
+    """Return the given stiffness, (3, 3) or (6, 6), without rounding errors.  Raises ValueError for an invalid one."""
     stiffness = _symmetric("stiffness", material.stiffness)
     noise = NOISE * np.abs(stiffness).max()
     if len(stiffness) == 6:
@@ -200,7 +197,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
-    """Remove the rounding asymmetry of a matrix.  Raises ValueError for a larger asymmetry."""
+    """Return the symmetric part of a matrix.  Raises ValueError for a relative asymmetry above NOISE."""
     matrix = np.array(rows)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
         raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
@@ -208,14 +205,14 @@ def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
 
 
 def _positive_definite(name: str, matrix: Float) -> Float:
-    """Return the matrix; ValueError if it is not positive definite."""
+    """Return the matrix unchanged.  Raises ValueError unless it is positive definite."""
     if not voigt.is_positive_definite(matrix):
         raise ValueError(f"{name} = {wording.toml_value(matrix.tolist())}: expected a positive definite matrix")
     return matrix
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Return the compliance (6, 6) in material axes; ValueError if unstable, or incomplete for the plane state."""
+    """Return the compliance (6, 6) as `known_compliance`; ValueError if unstable, or incomplete for the plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):
@@ -242,7 +239,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
 
 
 def known_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic) -> Float:
-    """Return the compliance (6, 6) in material axes; NaN for undetermined entries."""
+    """Return the compliance (6, 6) in material axes; NaN where undetermined.  Raises as `transverse_ratio` does."""
     if isinstance(material, material_forms.TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
         nu12, nu13 = transverse_ratio(material), nu31 * E1 / E3
@@ -259,7 +256,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
-    """Return nu_transverse, or E_transverse/(2 G_transverse) - 1.  Raises ValueError unless exactly one is given."""
+    """Return nu_transverse, else E_transverse/(2 G_transverse) - 1; ValueError unless exactly one of both is set."""
     ratio, shear = material.nu_transverse, material.G_transverse
     if ratio is not None and shear is None:
         return ratio
@@ -274,7 +271,7 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return the faults and warnings about a large contrast of stiffness or conductivity between stable phases."""
+    """Return the faults and the warnings about the contrast between phases, of stiffness or conductivity."""
     noun = "conductivities" if voigt.PLANE_STATES[plane].is_scalar else "stiffnesses"
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}

@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives with respect to each given constant; in space, expansions come last."""
+    """Yield derivatives by each given constant; by expansions only in space, and last.  Raises as `stiffness_of`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -71,7 +71,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield the derivatives with respect to engineering constants: dC = -C dS C with the plane state's compliance S."""
+    """Yield name, value and dC = -C dS C for each engineering constant.  S is the plane state's compliance."""
     skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -89,7 +89,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield the derivatives with respect to the entries of a stiffness, on both sides of the diagonal."""
+    """Yield name, value and dC for each entry of a given stiffness.  Entries ij and ji change together."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:
@@ -101,7 +101,7 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield the last part of the key, the value and dk (3, 3) for each conductivity in the cell's axes."""
+    """Yield name ending, value and dk (3, 3) for each conductivity in the cell's axes."""
     k = material.conductivity
     if isinstance(k, material_forms.FibreConductivity):
         yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])
@@ -116,7 +116,7 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Differentiate a complex stiffness or compliance, reduced to a plane state.
+    """Return the derivative of M, a stiffness or compliance with an imaginary step, in a plane state.
 
     A spatial state takes the whole matrix, a plane state its block; the state `condensed` eliminates component 33.
     """
@@ -129,7 +129,10 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate the engineering `constants` along the changes dC and dthermal."""
+    """Differentiate `constants` along the changes dC and dthermal.
+
+    The result has thermal constants only if `thermal` and `dthermal` are given.
+    """
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

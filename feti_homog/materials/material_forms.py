@@ -87,7 +87,7 @@ class Isotropic:
 
 @dataclass(frozen=True, kw_only=True)
 class Orthotropic:
-    """Engineering constants along the material axes, of which axis 3 is x3; nu_ij = -eps_j/eps_i under stress along i.
+    """Engineering constants along the material axes 1, 2 and 3 = x3; nu_ij = -eps_j/eps_i under stress along i.
 
     So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12, plane strain also E3, nu13, nu23, generalized all.
     """
@@ -190,11 +190,7 @@ MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compres
 
 
 def criterion(strength: PhaseStrength) -> str:
-    """Return the name of the criterion that the keys select.
-
-    Raises:
-        ValueError: no criterion has exactly these keys.
-    """
+    """Return the name of the criterion that the keys select.  Raises ValueError unless one criterion has these keys."""
     names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
         if names_given == list(names):
@@ -205,7 +201,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisations (n, modes) of a strength under stresses; Hashin has four modes, others one.
+    """Compute the utilisations (n, modes), at least 0, of a valid strength; Hashin has four modes, others one.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.
@@ -227,7 +223,7 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
 
 
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
-    """Compute the utilisations (n,) of the `MODES`, at most 0 where the stress has the other sign.
+    """Compute the utilisations (n,) of the four `MODES`; at most 0 where the stress has not the sign of the mode.
 
     A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """

@@ -1,13 +1,13 @@
 """Compute bounds on composite constants, and the model of aligned cylinders for bounds and estimates.
 
-Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases
-of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
-strain e, a change of area theta and a change T of temperature
+Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any stress unit.  Phases of
+cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A (index A: along the fibres, T:
+across), so that under an axial strain e, a change of area theta and a change T of temperature
 
     s = k theta + l e - b T,  b = 2 k alpha_T + l alpha_A,
     sigma_33 = l theta + n e - g T,  g = 2 l alpha_T + n alpha_A,
 
-where s is the mean of sigma_11 and sigma_22.
+where s is the mean of sigma_11 and sigma_22, and alpha_A and alpha_T are the expansions.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius."""
+    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, or None."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -120,7 +120,7 @@ class Estimates:
 
 @dataclass(frozen=True)
 class ConductivityEstimates:
-    """Closed forms for the conductivity of composites whose phases conduct isotropically in the plane."""
+    """Closed forms for the conductivity of composites with phases that are isotropic in the plane."""
 
     axial: float = described("along the fibres: the mean, which is exact", "conductivity")
     wiener: Pair | None = described(
@@ -135,17 +135,17 @@ class ConductivityEstimates:
 
 
 def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
-    """Return 1 / sum c/(p + p0) - p0 for cylinders with moduli p in a medium with p0, under equal far fields."""
+    """Return 1 / sum c/(p + p0) - p0: the modulus of cylinders with fractions c and moduli p in a medium with p0."""
     return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
 
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Return the upper bound sum c_i C_i, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return Voigt's upper bound sum c_i C_i, (m, m), from fractions (n,) and stiffnesses (n, m, m)."""
     return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
-    """Return the lower bound (sum c_i C_i^-1)^-1, (3, 3), from fractions (n,) and stiffnesses (n, 3, 3)."""
+    """Return Reuss's lower bound (sum c_i C_i^-1)^-1, (m, m), from fractions (n,) and stiffnesses (n, m, m)."""
     return np.asarray(np.linalg.inv(voigt(fractions, np.linalg.inv(np.asarray(stiffnesses, dtype=float)))))
 
 
@@ -157,9 +157,9 @@ def is_isotropic(stiffness: ArrayLike) -> bool:
 def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> Bounds:
     """Bound the plane moduli of an isotropic composite from fractions (n,) and isotropic stiffnesses (n, 3, 3).
 
-    k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
-    k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
-    Walpole 1969). The bound on k holds for square symmetry, too.  Raises ValueError if a phase is not isotropic.
+    k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0) with bulk moduli
+    k_i and shear moduli mu_i; k0, mu0 are the least moduli for the lower bound, the greatest for the upper (Hashin
+    1965, Walpole 1969). The bound on k holds for square symmetry, too.  Raises ValueError if a phase is not isotropic.
     """
     if not all(map(is_isotropic, stiffnesses)):
         raise ValueError("the Hashin-Shtrikman bounds hold for isotropic phases")
@@ -177,15 +177,16 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 def aligned_cylinders(
     fractions: Sequence[float], phases: Sequence[TransverseIsotropy], surroundings: tuple[float, float, float]
 ) -> TransverseIsotropy:
-    """Estimate the constants of cylinders in a reference medium k0, m0, p0 under equal far fields.
+    """Estimate the constants of cylinders in a reference medium under equal far fields.
 
-    With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
+    With fractions c, moduli `surroundings` = (k0, m0, p0), x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
 
         1/(k* + m0) = sum c/x,  1/(m* + h0) = sum c/(m + h0),  1/(p* + p0) = sum c/(p + p0),
         l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
         b* = (k* + m0) B,  B = sum c b/x,  g* = sum c (g - l b/x) + l* B,
 
-    because s + m0 theta is equal in all cylinders.  Hill 1964, Hashin 1965, Walpole 1969; b and g by the same steps.
+    because s + m0 theta is equal in all cylinders (Hill 1964, Hashin 1965, Walpole 1969; b, g likewise).  Expansions
+    are None unless all phases have both.
     """
     c, (k0, m0, p0) = np.asarray(fractions, dtype=float), surroundings
     k, nu, E, m, p = np.array(
@@ -230,7 +231,7 @@ def expansions(phase: TransverseIsotropy) -> Pair | None:
 
 
 def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
-    """Return the bonded fibre that replaces a fibre on springs, under a uniform far field.
+    """Return the bonded fibre that replaces a fibre on springs, under a uniform far field; without springs, the fibre.
 
     E_axial, nu_axial and the expansions remain, and
 
@@ -263,8 +264,8 @@ def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy
     """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
     The bounds are `aligned_cylinders` in a medium with the least, or the greatest, moduli of the phases.  Hill's
-    relation at the bounds on k gives the bounds on nu_A, for two phases only.  All bounds except the bounds on G_T
-    also hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
+    relation at the bounds on k gives the bounds on nu_A, for two phases only; None for more.  All bounds except the
+    bounds on G_T also hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
     """
 
     def extreme(pick: Callable[[Iterable[float]], float]) -> tuple[float, float, float]:

@@ -17,7 +17,7 @@ STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))
 THERMAL_STRESSES = tuple(f"thermal_{name}" for name in SPATIAL_STRESSES)
 EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial", *(f"expansion_{name}" for name in SPATIAL_STRAINS[3:]))
-"""Names of the strains per unit of temperature, with x3 along the fibres."""
+"""Names of the free strains (6,) per unit of temperature, in the spatial order with x3 along the fibres."""
 IN_PLANE = [0, 1, 5]
 """Indices of [11, 22, 12] in the spatial order."""
 IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
@@ -32,11 +32,11 @@ class PlaneState:
         title: name of the state in words.
         strains, stresses: component names, in Voigt order.
         is_sheet: whether S33 vanishes; otherwise E33 vanishes or is a load.
-        is_spatial: whether all six strains and a temperature are loads: then axial shear is a separate problem, the
-            stiffness is (6, 6), and constants, estimates and bounds are spatial.
+        is_spatial: whether components have the spatial order: the loads are six strains and a temperature, axial shear
+            is a separate problem, and stiffness (6, 6), constants, estimates and bounds are spatial.
         is_scalar: whether the unknown is a temperature: its gradient takes the positions [13, 23, 33] of strains, and
-            -q the same positions of stresses.
-        numbers: index of each plane strain in the names Cij of stiffness entries.
+            -q the positions of stresses, with the heat flux q; the stiffness is the conductivity (3, 3).
+        numbers: numbers in the names Cij of stiffness entries for the three plane strains.
     """
 
     name: str
@@ -55,12 +55,12 @@ class PlaneState:
 
     @property
     def locks(self) -> bool:
-        """Whether elements of nearly incompressible phases lock."""
+        """Whether displacement elements lock in nearly incompressible phases."""
         return not (self.is_sheet or self.is_scalar)
 
     @property
     def normals(self) -> int:
-        """The number of normal strains among the loads; they are the first components."""
+        """The number of normal strains among the components; they come first."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 
@@ -79,7 +79,7 @@ def plane_state_of(document: Document) -> PlaneState:
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the strain names and stress names, 3 in the plane or 6 in space."""
+    """Return the names of `count` strains and stresses: 3 in the plane, otherwise 6 in space."""
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
@@ -99,7 +99,7 @@ def rotated(stiffness: Float, angle: float) -> Float:
 
 
 def strain_rotation(angle: float) -> Float:
-    """Return T (6, 6), which transforms strains to axes turned about x3 by `angle` degrees."""
+    """Return the matrix T (6, 6) that transforms strains to axes turned about x3 by `angle` degrees."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     rotation = np.eye(6)
     rotation[IN_PLANE_BLOCK] = [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
@@ -108,7 +108,7 @@ def strain_rotation(angle: float) -> Float:
 
 
 def is_positive_definite(matrix: Float) -> bool:
-    """Return whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
+    """Return whether a symmetric matrix, its positive diagonal scaled to 1, has only eigenvalues above 1e-12."""
     diagonal = np.diag(matrix)
     if diagonal.min() <= 0.0:
         return False
@@ -117,14 +117,14 @@ def is_positive_definite(matrix: Float) -> bool:
 
 
 def von_mises(stress: Float, S33: Float) -> Float:
-    """Return the von Mises stress (m,), sqrt(3/2 s:s) with deviator s, of [S11, S22, S12] (m, 3) and S33 (m,)."""
+    """Return the von Mises stress (m,) from [S11, S22, S12] (m, 3) and S33 (m,): sqrt(3/2 s:s) with the deviator s."""
     S11, S22, S12 = stress.T
     between_11 = np.hypot(S11 - S22, S33 - S11)
     return np.asarray(np.hypot(between_11, np.hypot(S22 - S33, np.sqrt(6) * S12)) / np.sqrt(2))
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """Return the principal stresses (m, 3), largest first, of [S11, S22, S12] and S33; NaN where S33 is NaN."""
+    """Return the principal stresses (m, 3) of [S11, S22, S12] and S33 (m,), largest first; NaN where S33 is NaN."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]
@@ -132,12 +132,12 @@ def principal(stress: Float, S33: Float) -> Float:
 
 
 def spatial_von_mises(stress: Float, S33: Float, axial: Float) -> Float:
-    """Return the von Mises stress (m,), as `von_mises`, with the axial stresses [S23, S13] (m, 2)."""
+    """Return the von Mises stress (m,) from [S11, S22, S12] (m, 3), S33 (m,) and the axial [S23, S13] (m, 2)."""
     return np.asarray(np.hypot(von_mises(stress, S33), np.sqrt(3) * np.hypot(*axial.T)))
 
 
 def spatial_principal(stress: Float, S33: Float, axial: Float) -> Float:
-    """Return the principal stresses (m, 3), largest first, with arguments as in `spatial_von_mises`."""
+    """Return the principal stresses (m, 3), largest first, from the arguments of `spatial_von_mises`."""
     tensor = np.empty((len(stress), 3, 3))
     tensor[:, :2, :2], tensor[:, 2, 2] = stress[:, [[0, 2], [2, 1]]], S33
     tensor[:, :2, 2] = tensor[:, 2, :2] = axial[:, ::-1]

@@ -30,7 +30,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import NEGLIGIBLE, Load, LoadScales, solve_load, unresisted
 from feti_homog.typing import Bool, Float, Int
 
-# Number of block pivots from the last one with progress on; the literature usually allows ten without progress.
+# Number of block pivots, from the last one with progress; the literature usually allows ten without progress.
 BLOCK_PIVOTS = 11
 # Number of dual problems after which the search gives up; the certificate then shows the errors.
 MAX_CONTACT_SOLVES = 500
@@ -45,7 +45,7 @@ class ContactProblem:
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
         softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
-        block_pivots: number of block pivots, from the last progress on, after which single nodes change; 0: at once.
+        block_pivots: number of block pivots without progress after which single nodes change; 0: at once.
     """
 
     solver: FetiSolver
@@ -63,7 +63,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        All multipliers at bonded nodes, and normal forces at closed nodes, are active.
+        At debonded nodes only normal forces of closed nodes are active, with contact; all other multipliers are active.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -76,7 +76,7 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) of the bonds."""
+        """Return the spring compliance C (owned rows,) in the bond states."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -108,7 +108,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return the statuses after bonds `which` (k,) part: open after tension, closed after compression."""
+        """Return statuses (k,) after bonds `which` (k,) part: closed under pressure `lam` with contact, else open."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -138,14 +138,13 @@ class ContactProblem:
     def linear(self, load: Load, bonds: BondState, start: Float) -> DualSolution:
         """Solve the dual problem at fixed statuses, from multipliers `start` (owned rows,).  Collective.
 
-        Raises:
-            NotCarriedError: nothing carries the stresses of the load.
+        Raises NotCarriedError if nothing carries the stresses of the load.
         """
         self.prepare(bonds)
         return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Compute the amplitudes and jumps that a state lacks, by F lambda.  Collective."""
+        """Return the state with amplitudes and jumps by the dual operator; unchanged if it has them.  Collective."""
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
@@ -156,7 +155,7 @@ class ContactProblem:
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
-        """Solve for equilibrium under n loads `strains` (n, v) together, at fixed statuses.  Collective."""
+        """Solve for equilibria under n strains (n, v) at fixed statuses, from n multipliers `starts`.  Collective."""
         self.prepare(bonds)
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [
@@ -165,7 +164,7 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find the statuses and the solution under a load, from guessed `bonds`.  Collective; raises like `linear`."""
+        """Find statuses and solution under a load, from guessed bonds.  Collective; raises like `linear`."""
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:
@@ -176,7 +175,10 @@ class ContactProblem:
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `linear`."""
+        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `linear`.
+
+        The search gives up after MAX_CONTACT_SOLVES dual problems, or after a solve without convergence.
+        """
         comm, fewest, pivots = self.solver.comm, np.inf, 0
         iterations = solves = 0
         while True:
@@ -211,7 +213,10 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective."""
+        """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective.
+
+        Return the solution with the new positions, and the mask (k,).
+        """
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
             return solution, np.zeros(len(bonds.status), bool)

@@ -44,12 +44,12 @@ class CoupledInterfaces:
         return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
-        """Solve the dual problems at fixed statuses.  Collective."""
+        """Solve the dual problems at fixed statuses, from multipliers `start`.  Collective; raises NotCarriedError."""
         triples = zip(self.problems, self.parts(load), start, strict=True)
         return tuple(problem.linear(part, bonds, lam) for problem, part, lam in triples)
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """Find the equilibrium under a load, with `bonds` as a first guess of contact states.  Collective."""
+        """Find the equilibrium under a load, from guessed bonds.  Collective; raises like `linear`."""
         loads = self.parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start[0])
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
@@ -57,12 +57,12 @@ class CoupledInterfaces:
         return state
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Add amplitudes and jumps, by F lambda, to a state without amplitudes.  Collective."""
+        """Return the state with amplitudes and jumps in all problems, as in `ContactProblem.completed`.  Collective."""
         axial = None if state.axial is None else self.problems[1].completed(state.axial)
         return replace(self.plane.completed(state), axial=axial)
 
     def parts(self, load: Load) -> list[Load]:
-        """Split a load into the loads of the problems."""
+        """Split a load into one load for each problem."""
         return load.parts([len(problem.solver.problem.loads) for problem in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
@@ -106,7 +106,7 @@ def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
-    """Return twice the energy of damaged bonds on this rank, minus lam C lam.
+    """Return twice the energy in damaged bonds on this rank, minus lam C lam.
 
     Twice the energy, C_0 lam^2 + g^2 / (C - C_0), exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
     """

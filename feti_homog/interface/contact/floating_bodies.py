@@ -73,9 +73,9 @@ class _Fibres:
             yield nodes[first:last], motions @ modes, columns, modes
 
     def place(self, gap: Float, noise: float) -> tuple[Float, Bool]:
-        """Return the motions of overlapping fibres, and mark the nodes that squeeze a fibre.
+        """Compute the motions of overlapping fibres, and the nodes that squeeze a fibre, from gaps (k,).
 
-        `gap` is (k,); return amplitudes (motions,) and a mask (k,).
+        Return amplitudes (motions,), 0 for other fibres, and a mask (k,).  Raises ConvergenceError like `_maximised`.
         """
         squeezes, amplitudes = np.zeros(len(gap), bool), np.zeros(self.opening.shape[1])
         for node, motion, columns, modes in self.nodes_and_motions(gap < -noise):
@@ -92,7 +92,7 @@ class _Fibres:
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return both fractions of a step between gaps (k,), see `FloatingBodies.admissible_share`."""
+        """Return both fractions of a step between gaps (k,), as `FloatingBodies.admissible_share` defines them."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -115,17 +115,14 @@ class FloatingBodies:
     noise: float
 
     def place(self, solution: DualSolution) -> tuple[Float, Bool]:
-        """Move the free fibres until no open node overlaps by more than noise.  Collective, decided on rank 0.
+        """Find motions of free fibres that open all overlaps, up to noise.  Collective, decided on rank 0.
 
         A fibre that overlaps moves to the position with the largest minimum gap.  If even this gap overlaps, the dual
-        solution of the linear programme is a system of contact forces in balance: the nodes of these forces squeeze
-        the fibre, and have to close.
+        solution of the linear programme is a system of contact forces in balance: the nodes of these forces squeeze the
+        fibre, and have to close.  Raises ConvergenceError on every rank if HiGHS does not solve a linear programme.
 
         Returns:
-            Amplitudes (dimension,) to add to alpha, and (k,) open nodes that squeeze a fibre.
-
-        Raises:
-            ConvergenceError: on every rank, if HiGHS does not solve a linear programme.
+            Amplitudes (dimension,) to add to alpha, and the mask (k,) of open nodes that squeeze a fibre.
         """
         gap = solution.jump[self.nodes.row]
         if not self.comm.allreduce(bool((self.is_open & (gap < -self.noise)).any()), MPI.LOR):
@@ -141,13 +138,13 @@ class FloatingBodies:
 
             (1 - w) before + w after + M a >= 0,   for the second fraction   >= -2 noise.
 
-        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt.
-        Collective, decided on rank 0; raises like `place`.
+        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt; if it never
+        is, both are 1.  Collective, decided on rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 
     def _on_root(self, decide: Callable[..., T], *gaps: Float) -> T:
-        """Call decide(fibres, *gaps, noise) on rank 0, with the gaps of all ranks.  Collective."""
+        """Return decide(fibres, *gaps, noise) from rank 0, with the gaps of all ranks, on every rank.  Collective."""
         free = self.coarse.unconstrained_modes.tocsr()
         opening, slip = ((self.coarse.G[self.nodes.row + i] @ free).tocsr() for i in range(2))
         reach = np.zeros(free.shape[1])
@@ -168,10 +165,9 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of the step at which the first value (k,) reaches 0 and -2 noise.
+    """Return the fractions of a step at which the first value (k,) reaches 0 and -2 noise.
 
-    Both fractions are 1 if no value falls that far; `noise` is a number or (k,).  Values that end above -2 noise may be
-    the solver's error and do not count.
+    Both are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` may be (k,).
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
@@ -187,10 +183,9 @@ def _last_share(before: Float, after: Float, motion: Float, slack: float) -> flo
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
-    """Maximize w within `bounds`, subject to motions a + last w <= limits; the solution is x = (a, w).
+    """Maximize w within `bounds`, subject to motions a + last w <= limits, |a| <= LARGEST_MOTION; return x = (a, w).
 
-    Raises:
-        ConvergenceError: HiGHS found no solution.
+    Raises ConvergenceError if HiGHS finds no solution.
     """
     from scipy.optimize import linprog  # slow to import, and few cells have free fibres
 

@@ -56,11 +56,11 @@ class BondState:
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
-        """Return the bonds with other statuses (k,)."""
+        """Return the bonds with new statuses (k,)."""
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:
-        """Flip the contact state of the nodes `which` (k,).
+        """Return the bonds with the opposite contact state at the nodes in the mask `which` (k,).
 
         Debonded nodes open or close; pulled bonds become pressed, and pressed bonds pulled.
         """
@@ -69,7 +69,7 @@ class BondState:
         return replace(self, status=status, pressed=self.pressed ^ (which & bonded))
 
     def differs(self, other: BondState) -> Bool:
-        """Mark the nodes (k,) whose contact state differs from the state in `other`."""
+        """Mark the nodes (k,) whose contact state, status or pressure, differs from the state in `other`."""
         return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
@@ -83,7 +83,7 @@ class Equilibrium:
         solution: last dual solution.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists.
-        certificate: errors, as returned by `kkt_errors`.
+        certificate: errors by `kkt_errors`; with friction also `kkt_friction`.
         asked: (v,) sizes of the strains that the load causes in the bonded cell; with friction, the largest sizes for
             all loads up to this load.
         axial: equilibrium along the fibres with the same bonds, in generalized plane strain; else None.
@@ -160,7 +160,7 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """Measure the violation (k,) of Coulomb's law.
+    """Measure the violation (k,) of Coulomb's law by each node's tractions.
 
     The law is |t| <= mu p in stick and t = s mu p in slip; along the fibres, without friction, any shear violates it.
 

@@ -28,7 +28,7 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Pivots, beyond one per status of every node, after which other searches take over; pivots of a continuation step.
+# Largest number of pivots, besides one for each status of each node, before other searches, and of a continuation step.
 SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
@@ -41,18 +41,19 @@ INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
 class StuckError(NotCarriedError):
-    """A state has no continuation: no statuses of the debonded faces are admissible."""
+    """A state has no continuation: the search finds no admissible statuses of the debonded faces."""
 
 
 @dataclass(frozen=True)
 class StatusSearch:
     """A search for admissible face statuses (n,) and the scaled x (m,).
 
-    A method returns None if its search finds no admissible statuses.
+    A method returns None if its search finds no admissible statuses; the argument `status` (n,) is the first guess.
 
     Attributes:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; the search
             ignores the conditions for a change to any other status.
+        faces, load: the faces, and the prescribed loads and slips.
         start: (m,) scaled x before the load, where free motions keep their amplitude.
     """
 
@@ -62,25 +63,25 @@ class StatusSearch:
     start: Float
 
     def run(self, status: Status) -> Found:
-        """Search from a first guess by pivots, then by trial, then by continuation."""
+        """Search by pivots, then by trial, then by continuation, until a search succeeds."""
         result = self.by_pivots(status)
         return result or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
-        """Search by pivots, and return the final statuses and x if the forces balance."""
+        """Search by at most `solves` pivots.  Return the final statuses and x if the forces balance."""
         result, balanced = self._pivoted(status, solves)
         return result if balanced else None
 
     def slides_freely(self, status: Status) -> bool:
-        """Return whether the pivots end at statuses whose forces drive a free motion."""
+        """Return whether the pivots end at statuses with forces that drive a free motion."""
         result, balanced = self._pivoted(status)
         return result is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
-        """Correct wrong statuses by at most `solves` pivots.
+        """Correct wrong statuses by at most `solves` pivots; by default SOLVES and one for each status of each node.
 
-        Return the statuses, x, and whether the forces balance.  After some block pivots without progress, one
-        random node changes at a time: a fixed order may end in a cycle.
+        Return the statuses and x, or None without an end, and whether the forces balance.  After some block pivots
+        without progress, one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves or SOLVES + self.allowed.size):
@@ -98,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses: with all sliding faces stuck, then with one face stuck, then by trial."""
+        """Yield other admissible statuses and x: from all sliding faces stuck, from one face stuck, then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -108,11 +109,11 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to a guess, and x; None without any, or with too many candidates."""
+        """Return the admissible statuses closest to the guess, and x; None also with too many candidates."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses, the closest to a guess first; yield none if there are too many candidates."""
+        """Yield all admissible statuses and x, the closest to the guess first; nothing with too many candidates."""
         choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
@@ -125,7 +126,7 @@ class StatusSearch:
                 yield trial, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Raise the friction from zero to mu, and pivot from the last statuses at each step."""
+        """Search by pivots while friction rises in steps from zero to mu.  Steps start from the last statuses."""
         fraction, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:
@@ -140,7 +141,7 @@ class StatusSearch:
         return None
 
     def _improved(self, status: Status, x: Float) -> Status:
-        """Return the statuses (n,) that the signs of the forces and jumps require."""
+        """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
         faces, allowed, slip, last = self.faces, self.allowed, self.load.slip, 2 * self.faces.nodes
         normal, tangential = faces.forces(x)
         noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip
@@ -160,7 +161,7 @@ class StatusSearch:
 
 
 class CoulombFaces(FaceSystem):
-    """Debonded faces with Coulomb friction."""
+    """Debonded faces with Coulomb friction: a status (n,) for each node, and forces and jumps by scaled x (m,)."""
 
     def search(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find admissible statuses (n,) and scaled x from a first guess; arguments as in `StatusSearch`.
@@ -176,29 +177,28 @@ class CoulombFaces(FaceSystem):
         return result
 
     def all_allowed(self) -> Bool:
-        """Allow all statuses (n, 4); a touching face without friction has only the status FORWARD."""
+        """Return the mask (n, 4) of all statuses; without friction, a face may only be open or FORWARD."""
         allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
 
     def _known(self, status: Status) -> Status:
-        """Return statuses (n,) in which touching faces without friction are FORWARD."""
+        """Return the statuses (n,) with FORWARD at touching faces without friction."""
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Find the next statuses (n,) of a state x, and the rate (m,) of x under a load rate (v,).
+        """Find the next statuses (n,), and the rate (m,) of the state x under a load rate (v,).
 
-        Raises:
-            NotCarriedError, StuckError: as in `search`; StuckError also if the search finds only negative determinants.
+        Raises NotCarriedError and StuckError as `step` does.
         """
         load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
 
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Take an implicit step to a load, and return the statuses (n,) and x (m,).
+        """Find the statuses (n,) and x (m,) at the end of an implicit step to a load.
 
-        Raises:
-            NotCarriedError, StuckError: as in `rates`.
+        Raises NotCarriedError and StuckError as `search` does; StuckError also if all results have negative
+        determinants.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 
@@ -214,10 +214,8 @@ class CoulombFaces(FaceSystem):
         """Find admissible statuses without a negative determinant, and x; arguments as in `search`.
 
         A fibre that a few faces pinch jams if all of these faces stick, and snaps through with a negative stiffness if
-        one of these faces slides: both sets of statuses are admissible.
-
-        Raises:
-            NotCarriedError, StuckError: as in `search`; StuckError also if the search finds only negative determinants.
+        one of these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as
+        `step` does.
         """
         status, x = self.search(status, allowed, load, start)
         if self.sign(status, load.by_stress) >= 0:
@@ -228,7 +226,7 @@ class CoulombFaces(FaceSystem):
         raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
-        """Mark the allowed statuses (n, 4): present statuses and, at limits, the next statuses."""
+        """Return the mask (n, 4) of allowed statuses: present statuses and, at limits, the next statuses."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
         (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -254,12 +252,12 @@ class CoulombFaces(FaceSystem):
         return float((np.maximum(margins[ends], 0.0) / -falls[ends]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
-        """Return the frictional heat on the straight path between two states with equal statuses."""
+        """Return the frictional heat on the straight path between two states x with equal statuses."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy lost on the straight path at constant load, and the heat in this energy."""
+        """Return the lost energy and its heat on the straight path between states x at constant load."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -63,12 +63,12 @@ class FaceSystem:
         self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
 
     def forces(self, x: Float) -> tuple[Float, Float]:
-        """Return the scaled normal and tangential forces (n,)."""
+        """Return the scaled normal and tangential forces (n,) in a state x, tension positive."""
         f = -self.product(x)[: 2 * self.nodes]
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the factored response of the faces `before`; arguments as in `FollowedStatuses.grow`."""
+        """Take over the factored response of `before` if it can grow; see `FollowedStatuses.grow`."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -93,7 +93,7 @@ class FaceSystem:
         return y
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
-        """Solve for the scaled x (m,) with given statuses; return x, and whether x is a solution."""
+        """Solve for the scaled x (m,) with given statuses; return x, and whether the forces balance."""
         rows = status_system.free_rows(status, self.friction, load.by_stress)
         x, values = self.prescribed(status, load, start)
         followed = self._turned(*rows)
@@ -106,12 +106,12 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant for given statuses, 0 with free motions."""
+        """Return the sign of the determinant with given statuses, 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Update and return `FollowedStatuses` for given rows; None at a tiny pivot, or while factoring is cheaper."""
+        """Return `FollowedStatuses` with given rows; None at a tiny pivot, or while factoring is cheaper."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
@@ -144,7 +144,7 @@ class FaceSystem:
         return status_system.largest_share(unbalanced, sizes, slope) <= UNBALANCED
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with the prescribed entries, and the right-hand side (m,) in the load rows."""
+        """Return x (m,) with `start` in free entries, and the right-hand side (m,) in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

@@ -46,11 +46,7 @@ class CondensedProblem:
     """
 
     def __init__(self, interface: ContactProblem) -> None:
-        """Compute the response of the bonded cell to unit loads.  Collective.
-
-        Raises:
-            CaseError: the solver has no inverse of the dual operator.
-        """
+        """Compute the response of the bonded cell to unit loads.  Collective; raises CaseError without an inverse."""
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
             raise CaseError(solver_plan.WITHOUT_INVERSE)
@@ -79,21 +75,21 @@ class CondensedProblem:
         return np.asarray(increase[self.rows_of(slice(None))])
 
     def rows_of(self, node: Int | slice) -> Int:
-        """Return the owned rows (p, c) of nodes (p,)."""
+        """Return the owned rows (p, c) of this rank's nodes (p,)."""
         return self.interface.nodes.row[node][:, None] + np.arange(self.solver.jump_operator.components)
 
     def multipliers(self, jump: Float, strain: Float) -> Float:
-        """Return lam (owned rows,) under jumps (n,) and strains (v,)."""
+        """Return lam (owned rows,) under jumps (n,) in the condensed rows and strains (v,)."""
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return the multipliers in owned rows (k, c), and store the columns of these rows for the next call."""
+        """Return the multipliers in owned rows (k, c).  Columns of these rows stay stored for the next call."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the dual solution, with jumps from the dual operator.  Collective."""
+        """Return the dual solution under jumps (n,) and strains (v,), with jumps by the dual operator.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
@@ -111,9 +107,10 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The part of the matrix S of `coulomb_faces` for the axial problem, with eliminated jumps: g = K^-1 b E.
+    """The axial part of the matrix S of `coulomb_faces`, with eliminated jumps g = K^-1 b E.
 
-    A weak spring holds each row: HELD times the row's own diagonal entry of K, as other entries may be far larger.
+    K is H_DD with springs.  A weak spring holds each row: HELD times the row's own diagonal entry of K, as other
+    entries may be far larger.
 
     Attributes:
         problem: condensed axial problem.
@@ -139,10 +136,12 @@ class AxialFaces:
 class SlidingCell:
     """The debonded faces of a cell; every call of `take` replaces the set of faces.
 
+    Vectors x (m,) are scaled, as in `FaceSystem`, with the strains of all problems last.
+
     Attributes:
         interface: plane contact problem.
         friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged fraction of bonds.
-        rows: (n,) global normal row of each face, in ascending order.
+        rows, springs: (n,) ascending global normal rows of faces, and (2n,) stiffnesses 1 / (C - C_0) of damaged bonds.
         faces: dense system of these faces, on every rank.
     """
 
@@ -190,7 +189,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Return the statuses (n,) and scaled x (m,) of bonds at a strain (v,).  Collective.
+        """Condense the cell to `bonds`, and return their statuses (n,) and x (m,) at a strain (v,).  Collective.
 
         Without stored jumps all gaps and slips are zero.
         """
@@ -204,7 +203,7 @@ class SlidingCell:
         return status, np.concatenate([table[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
-        """Return this rank's bonds with the statuses (n,) and jumps of scaled x."""
+        """Return this rank's bonds with the statuses (n,) and the jumps in x."""
         face, jump = status[self._position], np.zeros((len(before.status), 2))
         jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
@@ -216,15 +215,15 @@ class SlidingCell:
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
     def stored(self, x: Float) -> float:
-        """Return the stored energy of the cell, per area."""
+        """Return the energy per area that the cell stores in the state x."""
         return float(x @ self.faces.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
-        """Return the energy per area in the springs 1 / (C - C_0) of the damaged bonds."""
+        """Return the energy per area in the springs 1 / (C - C_0) of damaged bonds in the plane."""
         return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.cell.area)
 
     def _jumps_of(self, x: Float) -> Float:
-        """Return the jumps (2n,) in the plane."""
+        """Return the unscaled jumps (2n,) of x in the plane."""
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
@@ -239,7 +238,7 @@ class SlidingCell:
         return np.asarray(force / self.interface.nodes.length[:, None])
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
-        """Return each condensed problem with its jumps and strains."""
+        """Return each condensed problem with its unscaled jumps and strains in x."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
         return [(self._plane, (jump, plane)), *((axial.problem, (axial.jumps @ along, along)) for axial in self._along)]
 
@@ -249,19 +248,20 @@ class SlidingCell:
         return next(parts).released_to(next(parts))
 
     def macroscopic(self, x: Float) -> Macroscopic:
-        """Return the macroscopic strains and stresses (v,)."""
+        """Return the macroscopic strains and stresses (v,) of all problems in the state x."""
         loads, size = self.faces.loads, self.faces.size
         return Macroscopic((x / size)[loads], (self.faces.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
-        """Return the load values (v,) in the units of x and S x."""
+        """Return the values (v,) of a load in the units of x and S x."""
         size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
-        """Return the equilibrium under the last of `loads`, certified on the scale of all loads.  Collective.
+        """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        `kkt_friction` is the largest of `coulomb_errors`, relative to the largest traction.
+        All `loads` scale the certificate; its `kkt_friction` is the largest of `coulomb_errors` over the largest
+        traction.
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()

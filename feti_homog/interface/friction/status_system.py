@@ -50,7 +50,7 @@ NOISE = 1e-11
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """Mark the free entries (m,) of x, and return s mu (m,) at sliding slips, 0 elsewhere."""
+    """Return the mask (m,) of free entries of x, and the slopes (m,): s mu at sliding slips, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
@@ -58,7 +58,7 @@ def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, F
 
 
 def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
-    """Return the residual (m,) for y = S x (m,) in free rows, 0 in prescribed rows."""
+    """Return the residual (m,) of rows `rhs` for the product y = S x (m,), 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
     missing = rhs - y
     missing[sliding] -= slope[sliding] * y[sliding - 1]
@@ -66,19 +66,19 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of the residuals (m,), each relative to the terms (m,) of its row."""
+    """Return the largest of the absolute residuals (m,), each relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
-    """The factored system of the free rows, S x = rhs, with x prescribed in all other rows.
+    """The factored system S x = rhs of the free rows, with prescribed x in other rows.
 
     A sliding node has the row S_t + s mu S_n, because the traction is s mu times the pressure.
 
     Attributes:
-        free: (m,) unknown entries of x.
+        free: (m,) mask of the unknown entries of x.
         sign: sign of the determinant, 0 with a free motion.
     """
 
@@ -95,7 +95,7 @@ class StatusSystem:
 
     @property
     def sign(self) -> int:
-        """The sign of the determinant, 0 with a free motion."""
+        """The sign of the determinant, 0 with a free motion; 1 without free rows."""
         if self._factor is None:
             return 1
         lu, pivots = self._factor
@@ -105,7 +105,7 @@ class StatusSystem:
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
     def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
-        """Solve for x (m,), and return whether x is a solution.
+        """Solve for x (m,); return x, and whether x is a solution.
 
         The start x holds the prescribed entries, and the amplitudes that free motions keep.  If the right-hand side
         `rhs` (m,) drives a free motion, no solution exists: springs of stiffness HELD bear the forces.
@@ -163,13 +163,13 @@ class FollowedStatuses:
         self._forget()
 
     def _forget(self) -> None:
-        """Drop all waiting changes."""
+        """Drop all changes that wait to be added to R."""
         capacity = self._R.shape[1]
         self._U, self._V = np.zeros((2, capacity, MOST_CHANGES)), np.zeros((MOST_CHANGES, capacity))
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Exchange all rows of M that differ from the arguments; return False if a pivot is too small."""
+        """Exchange all rows of M that differ from the arguments; return False if too small pivots leave some."""
         pending, size = np.flatnonzero((free != self.free) | (slope != self.slope)).tolist(), self._size
         while pending:
             failed = []
@@ -196,7 +196,7 @@ class FollowedStatuses:
         return True
 
     def _row(self, kind: int, at: int) -> Float:
-        """Return a row (m,) of M^-1 or S M^-1."""
+        """Return the row (m,) at position `at` of M^-1, for `kind` 0, or of S M^-1, for 1."""
         count, size = self._count, self._size
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
 
@@ -217,7 +217,7 @@ class FollowedStatuses:
         return np.asarray((self._R[0, :size, :size][:, columns] @ permuted[columns] - change)[self._index])
 
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """Solve for x; return x and S x (m,), from a start with the prescribed entries.
+        """Solve for x (m,) from a start with the prescribed entries; return x and S x.
 
         Return None if R has lost too many digits, relative to the terms sum_j |S_ij x_j| of each row.
         """

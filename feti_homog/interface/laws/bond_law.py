@@ -20,7 +20,7 @@ from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of utilisations below which bonds break together: in a symmetric cell the solver errs by less.
 UTILISATION_TIE = 1e-6
-# Number of halvings of a unit interval, or of steps of Newton's method, that exhausts double precision.
+# Number of halvings of a unit interval, or of Newton steps, that exhausts double precision.
 MOST_STEPS = 60
 # Exponent of the fibre factor for keys with these endings.  Laws remain similar, because all openings grow by the
 # factor too, and the process zone keeps its length.
@@ -30,7 +30,7 @@ Sections = Sequence[interface_section.InterfaceSection]
 
 @dataclasses.dataclass(frozen=True)
 class SectionValues:
-    """The values of [interface] keys at nodes (k,), which belong to the sections `pair` (k,).
+    """The values of [interface] keys at nodes (k,), which belong to the sections with indices `pair` (k,).
 
     The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
     """
@@ -40,20 +40,20 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the value of the first key that is set, a number or (k,); inf if no key is set."""
+        """Return the value of the first key that a section sets, a number or (k,); inf if the section sets none."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """Return the values (s,) in all sections, for the factor 1, equal on every rank."""
+        """Return the values (s,) in all s sections, for the factor 1, equal on every rank; (inf,) without sections."""
         names = (key, *more)
         values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the value of a key that all sections share."""
+        """Return the value of a key that is equal in all sections."""
         return getattr(self.bonds[0], key)
 
 
@@ -65,7 +65,7 @@ class BondLaw(ABC):
         has_toughness: whether bonds have a fracture energy, see `fracture`.
         has_tips: whether results compare the fracture energy with the energy release rates at debonding tips.
         is_convex: whether `share` is convex, so that the utilisation rises through 1 at most once on a straight path.
-        break_names: column names in `breaks`, for tractions with two or three components.
+        break_names: names of the columns in `breaks`; tractions with two components have no axial column.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -83,15 +83,15 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Describe breaks under tractions (p, c) by d values (p, d), named as in `break_names`."""
+        """Describe breaks under tractions (p, c) by d values (p, d), with the first d names in `break_names`."""
 
     @classmethod
     @abstractmethod
     def of_keys(cls, value: SectionValues) -> Self:
-        """Make the law from the keys in [interface]."""
+        """Make the law from the values of keys in [interface]."""
 
     def at(self, node: Int) -> Self:
-        """Return the law at the nodes (p,)."""
+        """Return the law at the nodes with indices (p,)."""
         values: dict[str, Any] = {k: value[node] for k, value in vars(self).items() if isinstance(value, np.ndarray)}
         return dataclasses.replace(self, **values)
 
@@ -100,29 +100,29 @@ class BondLaw(ABC):
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
-        """Return the law at this rank's nodes in a bond state.  Collective; the methods of the result are not."""
+        """Return the law at this rank's nodes in a bond state.  Collective; methods of the returned law are not."""
         return self
 
     def convex(self, p: int) -> Bool:
-        """Return whether `share` is convex, for each of `p` nodes (p,)."""
+        """Return the mask (p,) of nodes where `share` is convex, for a law at `p` nodes."""
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Break the bonds `which` (k,) under tractions (k, c).
+        """Break the bonds in the mask `which` (k,) under tractions (k, c).
 
         Return the new internal variables (k, h), and the mask (k,) of bonds that part.
         """
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """Return the compliance ratio C / C_0 (k, 3) of springs; None if C never changes.
+        """Return the compliance ratio C / C_0 (k, 3) to undamaged springs; None if C never changes.
 
-        Springs are in tension at the nodes `pulled` (k,), else in compression.
+        Springs are in tension at the nodes in the mask `pulled` (k,), else in compression.
         """
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the fracture energies per area (p,) of the p bonds marked by `which` (k,).
+        """Return the fracture energies per area (p,) of the p bonds in the mask `which` (k,); 0 without toughness.
 
         The tractions (k, c) determine the mode of each bond.
         """
@@ -134,11 +134,11 @@ class BondLaw(ABC):
 
     @property
     def overshoot(self) -> float:
-        """The excess of the first break's traction over the peak of the law, relative to this peak."""
+        """The relative excess of the first break's traction over the peak of the law; 0 without teeth."""
         return 0.0
 
     def onset(self) -> BondLaw:
-        """Return the law that predicts the first damage."""
+        """Return the law that predicts the first damage of intact bonds."""
         return self
 
     def mode_angle(self, traction: Float) -> Float:
@@ -150,15 +150,15 @@ class BondLaw(ABC):
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
     def first_factor(self, before: Float, direction: Float) -> Float | None:
-        """Return the smallest load factors (p,) that break each bond, in closed form.
+        """Return the smallest load factors f (p,) that break each bond, in closed form; None without a closed form.
 
         The traction `before` + f `direction` (p, c) breaks the bond at the factor f >= 0; f is inf if the bond never
-        breaks.  Return None if the law has no closed form.  `before` must break no bond.
+        breaks.  The traction `before` must break no bond.
         """
         return None
 
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
-        """Find the load factors (p,) at which bonds break, by bisection of [`low`, `high`].
+        """Find the load factors f (p,) at which bonds break, by bisection of [`low`, `high`] (p,).
 
         A bond breaks under `before` + f `direction` (p, c); a factor `high` that is too low is doubled first.
         """
@@ -176,7 +176,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """A law for bonds that break at a certain energy of the undamaged springs.
+    """A law for bonds that break at a certain energy of the undamaged springs, by mode.
 
     A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 
@@ -192,7 +192,7 @@ class SpringLaw(BondLaw):
     break_names: ClassVar[Sequence[str]] = ("psi",)
 
     def energies(self, traction: Float) -> tuple[Float, Float]:
-        """Return the spring energies (p,) of opening and of slip under tractions (p, c)."""
+        """Return the energies per area (p,) of opening and of slip in the springs under tractions (p, c)."""
         opening = np.maximum(traction[:, 0], 0.0) ** 2 / (2.0 * self.normal_stiffness)
         slip = traction[:, 1] ** 2 / (2.0 * self.tangential_stiffness)
         if traction.shape[1] == 3:
@@ -213,13 +213,13 @@ class SpringLaw(BondLaw):
 
 
 def law_class(name: str) -> type[BondLaw]:
-    """Return the class of the law with a name in `case.bond_laws`."""
+    """Return the class of the law with this name in `case.bond_laws`."""
     module, cls = bond_laws.LAWS[name].implementation.split(".")
     law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
     return law
 
 
 def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law from arguments as in `SectionValues`; without sections no bond breaks."""
+    """Make the bond law from the arguments of `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))

@@ -3,9 +3,9 @@
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 
 At a debonding tip the released energy is decisive.  The spring energy at a tip falls with the tributary length of the
-node, so a criterion by spring energy depends on the mesh; a criterion by released energy does not.  With H the
-inverse of the dual operator on the active rows, a break of bond i parts the faces by j = H_ii^-1 lam_i, and the energy
-of the cell falls, at constant strain, by
+node, so a criterion by spring energy depends on the mesh; a criterion by released energy does not.  With H the inverse
+of the dual operator on the active rows and nodal forces lam, a break of bond i parts the faces by j = H_ii^-1 lam_i,
+and the energy of the cell falls, at constant strain, by
 
     1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if the faces would overlap, and therefore keep the normal force.
 """
@@ -32,10 +32,10 @@ RIGID = 1e-9
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """The law by which a bond breaks when its spring energy reaches the toughness.
+    """The law in which a bond breaks when its spring energy reaches the toughness.
 
-    G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
-    G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
+        G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
+        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
 
     A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
 
@@ -64,7 +64,7 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return the factor sqrt(G_Ic / G_c) (p,) under tractions (p, c), which determine the modes."""
+        """Return the factor sqrt(G_Ic / G_c) (p,) for the modes of tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
@@ -76,11 +76,11 @@ class SpringEnergy(SpringLaw):
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """Return the toughness G_c (p,), an energy per area, under tractions (p, c), which determine the modes."""
+        """Return the toughness G_c (p,), an energy per area, for the modes of tractions (p, c)."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the toughness G_c (p,) of the bonds `which` (k,) under tractions (k, c)."""
+        """Return the toughness G_c (p,) of the bonds in the mask `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
 
@@ -91,7 +91,7 @@ class TipEnergies:
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
-        stiffness: (t, c) upper bounds for the diagonals of H and `axial`, see `ExactInverse.stiffness`.
+        stiffness: (t, c) upper bounds for the diagonals of H and for `axial`, see `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without an axial problem.
     """
 
@@ -103,9 +103,10 @@ class TipEnergies:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """The law by which a bond at a tip breaks when the break releases G_c l, with tributary length l.
+    """The law in which bonds at tips break by the released energy.
 
-    All other bonds break when the spring energy reaches G_c.
+    A bond at a tip breaks when this releases G_c l, with tributary length l; others, when the spring energy reaches
+    G_c.
 
     Attributes:
         influence: inverse dual operator of the plane problem.
@@ -126,10 +127,9 @@ class ReleasedEnergy(SpringEnergy):
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law at this rank's nodes in a bond state.  Collective, unlike the methods of the result.
+        """Return the law at this rank's nodes in a bond state.  Collective; methods of the returned law are not.
 
-        Raises:
-            ConvergenceError: rounding hides the released energy.
+        Raises ConvergenceError if rounding hides the released energy.
         """
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first
@@ -191,15 +191,15 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return whether `share` is convex (p,): not at tips, where the released energy need not be subadditive."""
+        """Return the mask (p,) of nodes with convex `share`: no tips, where energies need not be subadditive."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
     """Return the released energy (m,) of each break, from blocks H (m, 2, 2) and forces `lam` (m, 2).
 
-    `stiffness` (m, 2) bounds H.  Where H is a rounding error relative to this bound, as at the last bond of a fibre, no
-    force can act.  With `contact` the faces that would overlap keep the normal force.
+    `stiffness` (m, 2) bounds the diagonals of H.  Where H is a rounding error relative to this bound, as at the last
+    bond of a fibre, no force can act.  With `contact`, faces that would overlap keep the normal force.
     """
     root = np.sqrt(stiffness)
     ratio, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))

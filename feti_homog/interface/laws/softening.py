@@ -37,7 +37,7 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the constants of a law; the axial stiffness defaults to the tangential stiffness."""
+    """Return the constants of a law by `value`, a function of keys; axial stiffness defaults to tangential."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
@@ -78,7 +78,7 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:
-        """Return the dataclass fields that describe the softening branch."""
+        """Return the dataclass fields, by name, that describe the softening branch; {} without any."""
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
@@ -86,9 +86,7 @@ class CohesiveLaw(SpringLaw):
 
         In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  The default of `teeth`
         is the least number for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
-
-        Raises:
-            CaseError: more than MOST_TEETH teeth are necessary.
+        Raises CaseError if more than MOST_TEETH teeth are necessary.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
@@ -120,7 +118,7 @@ class CohesiveLaw(SpringLaw):
     @property
     @abstractmethod
     def last(self) -> float:
-        """The argument u at the end of the last tooth, which takes all energy that remains."""
+        """The argument u at the end of the last tooth, which takes all remaining energy."""
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
@@ -152,7 +150,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """Break the next tooth of the bonds that the mask `which` (k,) selects.
+        """Break the next tooth of the bonds in the mask `which` (k,).
 
         Return the new numbers of broken teeth (k, 1), and the mask (k,) of bonds whose last tooth breaks.
         """
@@ -165,19 +163,19 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """Return C / C_0 = 1 / (1 - d) (k, 3) of springs; 1 for pressed normal springs and parted bonds."""
+        """Return C / C_0 = 1 / (1 - d) (k, 3) of springs; 1 for normal springs without tension and for broken bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the energy W_j (d_j+1 - d_j) (p,) of each tooth that breaks."""
+        """Return the energy W_j (d_j+1 - d_j) (p,) of the next tooth of each bond in the mask `which` (k,)."""
         law, selected = self.at(np.flatnonzero(which)), traction[which]
         tooth = bonds.history[which, 0].astype(np.int64)
         return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
 
     def onset(self) -> QuadraticStrength:
-        """Return the strength criterion that predicts the first damage."""
+        """Return the strength criterion that predicts the first damage of intact bonds."""
         axial = self.tangential_strength * np.sqrt(self.axial_stiffness / np.asarray(self.tangential_stiffness))
         return QuadraticStrength(self.normal_strength, self.tangential_strength, axial)
 
@@ -208,7 +206,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
 
     def _taken(self, d: Float, s: Float | float) -> Float:
-        """Return phi (p,), the energy that damage up to d takes, divided by W_0."""
+        """Return phi (p,), the energy that damage from 0 to d takes, divided by W_0."""
         d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
         below = np.where(inside, d, 0.0)
@@ -219,7 +217,7 @@ class CohesiveLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class PiecewiseLinear(CohesiveLaw):
-    """A law with piecewise linear tau, with `heights` (m,) from 1 to 0 at `knots` (m,)."""
+    """A law with piecewise linear tau(u), with `heights` (m,) from 1 to 0 at the arguments `knots` (m,)."""
 
     knots: tuple[float, ...] = (0.0, 1.0)
     heights: tuple[float, ...] = (1.0, 0.0)
@@ -242,7 +240,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the linear piece with a sign change."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u): on the linear piece with a sign change."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -256,12 +254,12 @@ class PiecewiseLinear(CohesiveLaw):
 
 @dataclass(frozen=True)
 class BilinearLaw(PiecewiseLinear):
-    """A law with a traction that falls in a straight line."""
+    """A law with a traction that falls to 0 on a straight line."""
 
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law with a table of traction over opening in mode I, stretched to match the toughness in other modes."""
+    """A law by a table of tractions over openings in mode I.  Stretching adapts it to the toughness in other modes."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:
@@ -284,7 +282,7 @@ class ExponentialLaw(CohesiveLaw):
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral 1 - exp(-u)."""
+        """Return the integral int_0^u tau = 1 - exp(-u)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:

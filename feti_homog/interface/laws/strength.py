@@ -13,11 +13,11 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class Strength(BondLaw):
-    """A criterion that combines the limits of the traction components.
+    """A criterion that combines the utilisations of the traction components.
 
     Attributes:
-        normal, tangential: strengths R^n and R^t, inf for none.
-        axial: strength R^a along the fibre.
+        normal, tangential: strengths R^n and R^t, inf without a limit.
+        axial: strength R^a along the fibre, inf without a limit.
     """
 
     normal: float | Float
@@ -40,14 +40,14 @@ class Strength(BondLaw):
         """Combine the utilisations (p, c) of traction components to node utilisations (p,)."""
 
     def breaks(self, traction: Float) -> Float:
-        """Return the traction components (p, c), relative to their strengths."""
+        """Return the utilisations (p, c) of traction components (p, c), relative to their strengths; 0 for pressure."""
         pulls = np.abs(traction)
         pulls[:, 0] = np.maximum(traction[:, 0], 0.0)
         return np.asarray(pulls / self.limits[..., : traction.shape[1]])
 
     @property
     def limits(self) -> Float:
-        """The strengths (3,) or (k, 3)."""
+        """The strengths [normal, tangential, axial], (3,) or (k, 3)."""
         return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
 
 
@@ -55,11 +55,11 @@ class MaxStrength(Strength):
     """The criterion of the paper: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
 
     def together(self, shares: Float) -> Float:
-        """Return the largest utilisation (p,) of the components (p, c)."""
+        """Return the largest utilisation (p,) among the components (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the first component reaches its strength."""
+        """Return the load factors (p,) at which the first component reaches its strength; as in `BondLaw`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         towards = np.abs(ds)
@@ -76,7 +76,7 @@ class QuadraticStrength(Strength):
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the squared utilisations sum to 1; compression does not count."""
+        """Return the load factors (p,) at which the squared utilisations sum to 1; as in `BondLaw`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])

@@ -48,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Find the state at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
+        """Find the state at `begin`.  Collective; a leg from a waypoint reports its first change of statuses."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
@@ -66,7 +66,7 @@ class CoulombLeg(Leg):
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Call `find` on rank 0, and return the statuses and x on all ranks.  Collective."""
+        """Call `find` on rank 0; return the statuses and x on all ranks, and keep the product S x.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -78,21 +78,21 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Prescribe the load at a leg fraction, and the slips in scaled x."""
+        """Return the prescribed load at a leg fraction, with the slips in scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the current state, and add the energies since the last state."""
+        """Set the current statuses, x and macroscopic state.  Add the energies since the last state."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
-        slips is heat; the break releases the rest.
+        slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
         """
         sliding, self._bonds = self.sliding, begin.bonds
         self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
@@ -109,13 +109,13 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to given statuses and scaled x, with energy losses per area."""
+        """Advance on a straight path to new statuses and scaled x.  Energy losses are per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Advance along the rates to the next change of statuses, to the first break, or to the end of the leg.
+        """Advance along the rates to the next change, break or end of the leg, and yield points.  Collective.
 
         Raises:
             NotCarriedError: the cell carries no more load; the last point is at the largest load.
@@ -153,15 +153,15 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _go_to(self, share: float) -> None:
-        """Advance in one step to a leg fraction, or as far as the cell carries the load; set `limit`.  Collective.
+        """Advance in one step to a leg fraction.  Collective.
 
-        Raises:
-            NotCarriedError: the cell carries no more load than before; StuckError: no statuses are admissible.
+        If the cell carries only a part of the load, the step ends there and sets `limit`.  Raises NotCarriedError if it
+        carries no more load, and StuckError if no statuses are admissible.
         """
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the leg fraction that the cell carries, and the error that limits this fraction, or None."""
+            """Return the next leg fraction, and the error that limits it; None for all of `share`, even if stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -51,11 +51,11 @@ class FrictionlessLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """The equilibrium at s."""
+        """The equilibrium at s; not collective."""
         return self._state
 
     def points(self) -> Iterator[Point]:
-        """Yield the leg's points, up to a solve without convergence.  Collective."""
+        """Find the first equilibrium, and yield the leg's points up to a solve without convergence.  Collective."""
         self._settle(self._from)
         yield from super().points()
 
@@ -69,15 +69,15 @@ class FrictionlessLeg(Leg):
         self._go_to(self._share)
 
     def _go_to(self, share: float) -> None:
-        """Advance to the equilibrium at a leg fraction.  Collective."""
+        """Advance to the equilibrium at a leg fraction.  Collective; raises like `CoupledInterfaces.equilibrium`."""
         self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
 
     def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
-        """Solve for the equilibrium at a leg fraction, from guesses.  Collective."""
+        """Solve for the equilibrium at a leg fraction, from guessed bonds and multipliers.  Collective."""
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state to an equilibrium at a leg fraction, and add the energies since the last state."""
+        """Set the state at a leg fraction, and add the energies since the last state.  Collective."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -86,7 +86,7 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Advance past the next event, or to the end of the straight response.  Collective.
+        """Advance past the next event, or to the end of the straight response, and yield points.  Collective.
 
         Raises:
             NotCarriedError: neither open nor touching faces carry the load's stresses.
@@ -130,11 +130,11 @@ class FrictionlessLeg(Leg):
         yield from self._break_overloaded(is_due)
 
     def _is_due(self) -> bool:
-        """Return whether the most utilised bonds are at their strength."""
+        """Return whether the most utilised bonds are at their strength.  Collective."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or to the end of the straight response.
+        """Advance to the target, or to the end of the straight response.  Collective.
 
         Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
         """
@@ -171,9 +171,9 @@ class FrictionlessLeg(Leg):
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _turn(self, position: float) -> Point:
-        """Return the state as a point without a break; the path goes on at `position`."""
+        """Return the state as a point without a break; the path goes on at `position`.  Collective."""
         return self._point(0, 0, replace(self._path_state(), position=position))
 
     def _differs(self, before: Equilibrium) -> bool:
-        """Return whether contact states have changed.  Collective."""
+        """Return whether contact states have changed since the equilibrium `before`.  Collective."""
         return bool(self.cell.comm.allreduce(bool(self._state.bonds.differs(before.bonds).any()), MPI.LOR))

@@ -14,7 +14,7 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path import path_points
 from feti_homog.typing import Bool, Float
 
-# Difference below which fractions of a leg are equal.
+# Difference up to which fractions of a leg count as equal.
 SAME_SHARE = 1e-9
 
 
@@ -23,6 +23,7 @@ class Leg(ABC):
 
     The loads at s = 0 and s = 1 prescribe the same components as strains and as stresses.  Bonds break at constant
     load: the state before a break is a point, and the path continues from the state after the break at the same s.
+    Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
 
     Attributes:
         limit: error that stopped the last step short of its load, or None.
@@ -50,11 +51,11 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break if any.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
-        """Advance to the next event, or part of the way, and yield the points.  Collective."""
+        """Advance to the next event, or part of the way, and yield points.  Collective."""
 
     @abstractmethod
     def _go_to(self, share: float) -> None:
@@ -68,7 +69,11 @@ class Leg(ABC):
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
     def step(self, number: int, steps: int, worst_only: bool) -> path_points.Point:
-        """Return the point after step `number` of the path, with numbers from 1.  Collective."""
+        """Advance by step `number`, from 1, break overloaded bonds, and return the point.  Collective.
+
+        With `worst_only`, only the worst bonds break between two solves.  If the cell carries only a part of the step,
+        the point is at this part, and `limit` is set.
+        """
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
         first = self._used()[0]
@@ -94,17 +99,17 @@ class Leg(ABC):
         return self._share >= 1.0
 
     def _used(self) -> tuple[Float, float, Bool]:
-        """Return `most_utilised` for the state, computed once.  Collective."""
+        """Return `path_points.most_utilised` for the state, computed once.  Collective."""
         if self._utilisation is None or self._utilisation[0] is not self.state:
             self._utilisation = self.state, path_points.most_utilised(self.cell, self.law, self.state)
         return self._utilisation[1]
 
     def _is_overloaded(self) -> bool:
-        """Return whether a break or a contact change has overloaded bonds.  Collective."""
+        """Return whether the state has converged and has bonds beyond their strength.  Collective."""
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Break the worst bonds at s until no bond is overloaded; if `is_due`, break at least once.  Collective."""
+        """Yield a point and break the worst bonds, until none is overloaded.  Collective; `is_due`: at least once."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)
@@ -119,7 +124,7 @@ class Leg(ABC):
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, at which `broke` bonds part and `softened` bonds soften.  Collective."""
+        """Return the point at s, where bonds part and soften.  Collective; the sum of energies starts anew."""
         energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)

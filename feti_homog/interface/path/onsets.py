@@ -28,10 +28,10 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """The first break in a cell with debonded faces that do not touch.
+    """The first break in one bond state, where debonded faces do not touch.
 
     Attributes:
-        bonds: bond law at this rank's nodes in one bond state.
+        bonds: bond law at this rank's nodes in the bond state.
         bonded: (k,) nodes with a bond.
     """
 
@@ -40,18 +40,18 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset for a law and a bond state.  Collective."""
+        """Take the law and the bonded nodes in a bond state.  Collective; raises like `BondLaw.in_state`."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """Return the utilisation (p,) under tractions (p, c) at the nodes (p,), 0 at debonded nodes."""
+        """Return the utilisation (p,) under tractions (p, c) at the nodes with indices (p,), 0 at debonded nodes."""
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the load factors f >= 0 (n, k) that break the first bonds under n traction rays.
+        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays, or inf.
 
-        Factors of other bonds are inf.  Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone
-        breaks nothing.  Utilisations under `direction` up to `noise`, (n,) or (n, k), count as zero.
+        Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations under
+        `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
@@ -78,10 +78,10 @@ class Onset:
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
-    """Return the fraction of a step between tractions (k, c) at which the first bond breaks, or inf.  Collective.
+    """Return the fraction of a step at which the first bond breaks, or inf.  Collective.
 
-    A convex utilisation that begins below 1 and ends above 1 passes 1 at a single point, which bisection finds.
-    Without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
+    The step leads from tractions `before` (k, c) to `after`.  A convex utilisation passes 1 at a single point, which
+    bisection finds; without convexity, the first part of the step that ends with a utilisation above 1 is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
@@ -96,11 +96,11 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of a step where contact begins to change, and where it surely has changed.
+    """Return the fractions of a step where contact begins to change, and surely has changed.
 
-    Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens
-    when its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when
-    the fibre has no more room (because gaps are not unique).  Collective.
+    Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens when
+    its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the
+    fibre has no more room (because gaps are not unique).  Collective.
     """
     solver, nodes = interface.solver, interface.nodes
     tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
@@ -110,7 +110,7 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
     before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
     shares = [shares_to_zero(before, after, tension[in_contact])]
-    # Faces without contact overlap.
+    # Without contact, faces may overlap.
     is_open = (state.status == OPEN) & interface.contact
     before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))

@@ -27,12 +27,10 @@ def events(
 ) -> Iterator[Point]:
     """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a
-    point precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with
-    `broke` = 0: between points the response is straight.  A point without convergence is the last one.
-
-    Raises:
-        NotCarriedError: the cell carries no more load; the last point is at the largest load.
+    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a point
+    precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with `broke` = 0:
+    between points the response is straight.  A point without convergence is the last one.  Raises NotCarriedError if
+    the cell carries no more load; the last point is at the largest load.
     """
     for leg in range(begin.leg, len(waypoints)):
         if leg == 0 and engine is FrictionlessLeg:
@@ -60,10 +58,8 @@ def increments(
 
     The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only`, only the
     worst bonds break between two solves.  A point without convergence is the last one; with friction, the last point
-    may be at the largest load that the cell carries.
-
-    Raises:
-        NotCarriedError: the cell carries no more load, or a step has no admissible statuses.
+    may be at the largest load that the cell carries.  Raises NotCarriedError if the cell carries no more load, or a
+    step has no admissible statuses.
     """
     legs, current = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):
@@ -81,7 +77,7 @@ def increments(
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
-    """Yield the points from zero to the load, through all equilibria.
+    """Yield the points from zero to the load, through all equilibria.  Collective; raises like `events`.
 
     With fixed bonds, the state under t times the load is t times the state, for t >= 0.
     """

@@ -40,7 +40,7 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies between the last point and a state; a contact change loses no energy."""
+        """Return the energies between the last point and the state `after`; only a break loses energy."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
@@ -87,7 +87,7 @@ class Point:
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the unloaded path state with given bonds."""
+    """Return the unloaded path state with these bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
@@ -95,7 +95,7 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
+    """Break the bonds in the mask `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
 
     Return the numbers of bonds that part and that soften, over all ranks, and the path state `place` after the break.
     """
@@ -116,7 +116,7 @@ def break_bonds(
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
     """Return the utilisations, the largest value, and the most utilised nodes.  Collective.
 
-    The utilisations are (k,), 0 at debonded nodes; the last result is a mask (k,) of nodes.
+    The utilisations are (k,), 0 at debonded nodes; the largest value is over all ranks; the nodes are a mask (k,).
     """
     comm = cell.comm
     used = law.in_state(cell, state.bonds).share(held_traction(cell, state))
