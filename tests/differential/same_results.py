@@ -55,8 +55,8 @@ def _unit(setting: Setting, within: tuple[float, float]) -> float:
 
 def order_of_input(setting: Setting) -> Compared:
     """Keys, rows of tables, arcs and sections of interfaces in another order.  Collective."""
-    document, fibres, order = transforms.reordered(setting.rng, setting.drawn.document)
-    return setting.compared(transforms.relabelled(setting.solved(document), fibres, order))
+    document, places = transforms.reordered(setting.rng, setting.drawn.document)
+    return setting.compared(transforms.relabelled(setting.solved(document), places))
 
 
 def pieces(setting: Setting) -> Compared:

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from support.dimensions import Units
@@ -37,31 +37,36 @@ def sections(document: Mapping[str, Any]) -> list[Document]:
     return given if isinstance(given, list) else [given]
 
 
-def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, list[int], list[int]]:
-    """Return the case with keys, fibres, arcs and sections of interfaces in another order.
+class Places(NamedTuple):
+    """The places, from 0, that fibres, rows of the table and sections of interfaces had; empty where they stay."""
 
-    Of each fibre, and of each section, the place that it had.
-    """
+    fibres: list[int]
+    rows: list[int]
+    sections: list[int]
+
+
+def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, Places]:
+    """Return the case with keys, fibres, arcs and sections of interfaces in another order, and their former places."""
     case = copy.deepcopy(document)
     scattered = any("scatter" in section for section in sections(case))
-    fibres, places = _shuffled_rows(rng, case["cell"], scattered)
+    fibres, rows = _shuffled_rows(rng, case["cell"], scattered)
     for section in sections(case):
         if "between" in section:
             section["between"] = section["between"][::-1]
         arcs = section.get("debonded", [])
         for arc in arcs:
-            if places and arc["fibre"] != "all":
-                arc["fibre"] = places.index(arc["fibre"] - 1) + 1
+            if fibres and arc["fibre"] != "all":
+                arc["fibre"] = fibres.index(arc["fibre"] - 1) + 1
         if arcs:
             section["debonded"] = [arcs[k] for k in rng.permutation(len(arcs))]
     order = rng.permutation(len(sections(case))).tolist()
     if len(order) > 1:
         case["interface"] = [case["interface"][k] for k in order]
-    return _reversed_keys(case), fibres, order
+    return _reversed_keys(case), Places(fibres, rows, order)
 
 
 def _shuffled_rows(rng: np.random.Generator, cell: Document, scattered: bool) -> tuple[list[int], list[int]]:
-    """Reorder the rows of a table; of each fibre the number, from 0, that it had, twice.
+    """Reorder the rows of a table; return the former numbers of fibres and of rows, from 0.
 
     Strengths that are drawn belong to the numbers: such rows keep their order.
     """
@@ -70,8 +75,7 @@ def _shuffled_rows(rng: np.random.Generator, cell: Document, scattered: bool) ->
     if rows:
         cell["fibre_list"] = [rows[k] for k in order]
     solid = [k for k, row in enumerate(rows) if row.get("phase") != "void"]
-    own = [solid.index(k) for k in order if k in solid]
-    return own, own
+    return [solid.index(k) for k in order if k in solid], order
 
 
 def _reversed_keys(value: Any) -> Any:
@@ -80,23 +84,25 @@ def _reversed_keys(value: Any) -> Any:
     return [_reversed_keys(item) for item in value] if isinstance(value, list) else value
 
 
-def relabelled(result: Any, fibres: Sequence[int], order: Sequence[int]) -> Any:
-    """Return a result of `reordered` whose fibres and sections have the numbers that they had."""
+def relabelled(result: Any, places: Places) -> Any:
+    """Return a result of `reordered` whose fibres, rows and sections have the numbers that they had."""
     if isinstance(result, list):
-        return [relabelled(item, fibres, order) for item in result]
+        return [relabelled(item, places) for item in result]
     if not isinstance(result, Mapping):
         return result
-    found = {k: relabelled(v, fibres, order) for k, v in result.items()}
-    for name, places in (("debonded_length", fibres), ("debonding_angle", fibres), ("debonded_shares", order)):
-        if name in found and places:
-            found[name] = [found[name][k] for k in np.argsort(places)]
+    found, (fibres, _, order) = {k: relabelled(v, places) for k, v in result.items()}, places
+    for name, own in (("debonded_length", fibres), ("debonding_angle", fibres), ("debonded_shares", order)):
+        if name in found and own:
+            found[name] = [found[name][k] for k in np.argsort(own)]
     if "solver" in found:  # the whole result
-        found["fibres"] = _renumbered(found["fibres"], fibres)
+        found["fibres"] = _renumbered(found["fibres"], places)
     return _relabelled_tips(found, fibres, order) if "G_I" in found else found
 
 
-def _renumbered(fibres: Sequence[Document], places: Sequence[int]) -> list[Document]:
-    records = [fibres[k] for k in np.argsort(places)] if places else fibres
+def _renumbered(fibres: Sequence[Document], places: Places) -> list[Document]:
+    records = [fibres[k] for k in np.argsort(places.fibres)] if places.fibres else fibres
+    if places.rows:
+        records = [record | {"row": places.rows[record["row"] - 1] + 1} for record in records]
     return [record | {"number": number} for number, record in enumerate(records, 1)]
 
 

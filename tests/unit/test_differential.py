@@ -277,5 +277,9 @@ def test_a_case_in_other_units_and_in_another_order(tmp_path: Path):
     assert found == {
         "openings": [200.0, 300.0], "tractions": [40.0, 0.0], "normal_toughness": 5000.0, "mixing_exponent": 6.0,
     }  # fmt: skip
-    same, fibres, _ = transforms.reordered(np.random.default_rng(1), document)
-    assert fibres == [0] and same["interface"]["debonded"][0]["fibre"] == 1
+    same, places = transforms.reordered(np.random.default_rng(3), document)
+    assert places.fibres == [0] and same["interface"]["debonded"][0]["fibre"] == 1
+    rows = [document["cell"]["fibre_list"][k] for k in places.rows]
+    assert same["cell"]["fibre_list"] == rows != document["cell"]["fibre_list"]
+    fibres = [{"number": 1, "row": places.rows.index(0) + 1}]
+    assert transforms.relabelled({"solver": {}, "fibres": fibres}, places)["fibres"] == [{"number": 1, "row": 1}]
