@@ -149,7 +149,7 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return the fields of a part that become datasets, because they have rows."""
+    """Return the descriptions, by name, of the fields of a part that become datasets, because they have rows."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
@@ -215,7 +215,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
-    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with some `entries`."""
+    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33]; missing `entries` are 0."""
     places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
     columns = {place: entries[entry] for place, entry in places if entry in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"

@@ -91,9 +91,10 @@ def state_parts(
     point: int,
     fields: recovered_fields.RecoveredFields,
 ) -> Iterator[StatePart]:
-    """Yield the part of each state, from its responses in all problems and the recovered `fields`.  Collective.
+    """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
 
-    A problem whose response is None has zero fields.  Conduction takes the place of the axial problem.
+    A state has a response in the plane problem and, if there is one, in the axial problem; conduction takes the place
+    of the axial problem.  A problem without a response (None) has zero fields.
 
     Raises:
         ValueError: a state has no response.

@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write`."""
+    """Return the text of a document with arrays, as `loads` parses it.  Raises as `write` for values."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -65,6 +65,7 @@ def read(directory: Path) -> dict[str, Any]:
 
     Raises:
         CaseError: the file is missing, is not a JSON table or has changed, or its layout has another version.
+        FetiHomogError: the file has no read permission.
     """
     path = Path(directory) / NAME
     try:
@@ -117,12 +118,10 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 
 
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
-    """Write records of one class as rows: numbers under their names, arrays under their component names.
+    """Write records of one class as rows, and return the path.  Call on one rank.
 
-    Empty columns, arrays without components and nested records are left out.  Call on one rank.
-
-    Raises:
-        FetiHomogError: the table cannot be written.
+    Columns are numbers, and array components; empty columns, other arrays and nested records are left out.  Raises
+    FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []
@@ -166,7 +165,7 @@ class EventLog:
         self._stream: TextIO | None = None
 
     def write(self, line: str) -> None:
-        """Append a line to the log."""
+        """Append a line to the log; nothing on other ranks and after `close`."""
         if not self._wanted:
             return
         try:
@@ -190,18 +189,15 @@ class EventLog:
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Serialize a document, with its checksum as last key.  Raises ValueError for NaN."""
+    """Serialize a document, with its checksum as last key.  Raises ValueError for NaN and infinities."""
     text = _text({key: value for key, value in document.items() if key != KEY})
     return _sealed(text, _checksum(text))
 
 
 def loads(text: str) -> dict[str, Any]:
-    """Parse a document and verify its checksum, which is removed.
+    """Parse a document and verify its checksum, if it has one; return the document without the checksum.
 
-    A document without a checksum is not verified.
-
-    Raises:
-        ValueError: the text is not JSON or not a table, or does not match its checksum.
+    Raises ValueError if the text is not JSON or not a table, or does not match its checksum.
     """
     try:
         document = json.loads(text)
@@ -234,10 +230,8 @@ class FileSeal:
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
     """Return the size and checksum of a file.
 
-    Call on the rank that completed the file: other ranks may still see an earlier file of that name.
-
-    Raises:
-        FetiHomogError: the file cannot be read.
+    Call on the rank that completed the file: other ranks may still see an earlier file of that name.  Raises
+    FetiHomogError if the file cannot be read.
     """
     with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -271,7 +265,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize with indents; an array of numbers, or a row of a matrix, takes one line."""
+    """Serialize a value with indents; an array of numbers, or a row of a matrix, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"
