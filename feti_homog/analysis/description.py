@@ -19,7 +19,7 @@ from feti_homog.system.petsc import options_database
 def describe(case: Case, comm: MPI.Intracomm) -> str:
     """Describe a run of the case on these ranks, under its own options; empty except on rank 0.  Collective.
 
-    Raises like `tear`.
+    Raises CaseError and MeshError as `unit_cell.tear` does.
     """
     with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -68,10 +68,8 @@ def _cost_lines(
 ) -> Iterator[str]:
     """Yield lines about the solver, ranks and memory; for a path, also up to complete debonding.
 
-    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.
-
-    Raises:
-        CaseError: as in `solver_plan.choose`, or if a case with friction has no influence columns.
+    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError as
+    `solver_plan.choose`, or if a case with friction has no influence columns.
     """
     problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across

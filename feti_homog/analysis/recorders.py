@@ -43,7 +43,7 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: averaging.Response) -> str:
-        """Record the checks of a response and return a line about it.
+        """Record the checks of a response and return a line about the response.
 
         A solve without convergence and a failed check are faults.
         """
@@ -129,7 +129,7 @@ class StateRecorder:
                 self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
-        """Complete the file and return its seal; None without a file.  Collective."""
+        """Complete the file and return its seal; None without a file or after a write error.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 

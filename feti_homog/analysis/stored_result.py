@@ -34,10 +34,8 @@ def read(directory: Path) -> dict[str, Any]:
 def check_to_draw(directory: Path) -> str:
     """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
-    The file result.h5 is required, result.json is optional.  Returns the status of an unfinished path, else nothing.
-
-    Raises:
-        CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
+    A folder without result.json and checkpoint needs result.h5.  Returns the status of an unfinished path, else "".
+    Raises CaseError if a needed file is missing, or a file is damaged, or from another program or run.
     """
     # Also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
