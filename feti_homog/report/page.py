@@ -47,7 +47,7 @@ def write(directory: Path) -> Path:
 
     Raises:
         CaseError: the folder has no result, is the folder of a sweep, or has a missing or damaged file.
-        FetiHomogError: the report cannot be written.
+        FetiHomogError: result.json cannot be read, or the report cannot be written.
     """
     if not directory.is_dir():
         raise CaseError(f"cannot report {directory}: there is no such folder")
@@ -65,8 +65,7 @@ def write(directory: Path) -> Path:
 def page(document: Document, directory: Path) -> str:
     """Return the HTML page of a result.
 
-    Raises:
-        OSError, KeyError, TypeError, ValueError: a result file is missing or damaged.
+    Raises OSError, KeyError, TypeError or ValueError if a result file is missing or damaged.
     """
     title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
     style = files.joinpath("page.css").read_text(encoding="utf-8")

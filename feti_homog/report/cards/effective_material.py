@@ -76,7 +76,8 @@ class EffectiveMaterial:
     def constants(self) -> dict[str, float]:
         """Return the engineering constants by name, in the order of an Abaqus card.
 
-        E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij.
+        With the compliance S: E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i), G_ij = 1/(shear
+        entry).
         """
         S = self.compliance
         return {
@@ -89,7 +90,7 @@ class EffectiveMaterial:
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """Return the material of a result with stiffness and expansion as computed.
 
-    The material is orthotropic if all other entries are negligible.
+    Shears are uncoupled, and the material orthotropic, if their couplings and expansions are within NEGLIGIBLE.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
@@ -118,9 +119,8 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     """Return the nearest transversely isotropic material of a result.
 
-    Raises:
-        CaseError: the result has no such material, or did not converge.
-        KeyError, TypeError, ValueError: the result is damaged.
+    Raises CaseError if the result has no such material, or did not converge; KeyError, TypeError or ValueError if the
+    result is damaged.
     """
     _stiffness(document)
     computed = document["transversely_isotropic"]
@@ -160,7 +160,7 @@ def require_done(document: Document) -> None:
 
 
 def _stiffness(document: Document) -> Float:
-    """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
+    """Return the symmetric positive definite stiffness (6, 6) in cell axes.  Raises CaseError if a result has none."""
     require_done(document)
     analysis = document["case"]["analysis"]
     if document.get("effective_stiffness") is None:
@@ -217,9 +217,9 @@ def number(value: float, width: int = 24) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert a name to letters, digits and single underscores.
+    """Convert the first 60 characters of a name to letters, digits and single underscores.
 
-    The identifier begins with a letter and has at most 60 characters.
+    The prefix `material_` comes before an identifier that does not begin with a letter.
     """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
@@ -228,7 +228,7 @@ def identifier(name: str) -> str:
 def conductor_card(document: Document, form: str, symmetry: str) -> str:
     """Return the card of a conductivity as computed, or of the nearest "transversely isotropic" conductivity.
 
-    Couplings up to `NEGLIGIBLE` sqrt(k_ii k_jj) are left out.
+    Couplings are left out: of the nearest conductivity all, as computed up to `NEGLIGIBLE` sqrt(k_ii k_jj).
 
     Raises:
         CaseError: the result did not converge, has larger couplings, or the format has no conductivity.

@@ -84,7 +84,7 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
 
 
 def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
-    """Return the rows (p, 2) of a nodal table at the drawn nodes."""
+    """Return the rows (p, ...) of a nodal table at the drawn nodes."""
     return _picked(table, drawn.nodes, drawn.block)
 
 
@@ -140,7 +140,8 @@ def _picked(table: Any, numbers: Array, block: int) -> Array:
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     """Return the displacements u of a state at the drawn nodes (p, 2).
 
-    The solution leaves the translation open; here u* = u - E x has zero mean over the drawn triangles.
+    The solution leaves the translation open; here u* = u - E x has zero mean over the drawn triangles, with the
+    macroscopic strain E and the positions x.
     """
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))

@@ -64,7 +64,7 @@ class InterfaceEdges:
         return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
 
     def state(self, status: Array) -> Array:
-        """Return the edge states (e,) for node states (k,): open if an end is open, else in contact or damaged."""
+        """Return the edge states (e,) for node states (k,): the state of either end that is later in STATE_NAMES."""
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
@@ -99,7 +99,7 @@ class DrawnCell:
 
     @classmethod
     def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
-        """Read the cell of an open result.h5, coarsened to about `limit` triangles at most."""
+        """Read the cell of an open result.h5, coarsened to `limit` triangles where the nesting allows."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
@@ -185,7 +185,7 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return the visible strains and the temperature of a state as formulas.
+        """Return the visible strains and the temperature of a state as formulas; ["no strain"] without any.
 
         A path with many strains shows the leading strain and its stress; a load shows the components in its section.
         """

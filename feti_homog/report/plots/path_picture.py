@@ -145,7 +145,7 @@ def _records(document: Document) -> Array | None:
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Label points on a curve (points, 2) with `numbers` and pointers, each where there is most room."""
+    """Label the points `numbers` on a curve (points, 2) with pointers, each where there is most room."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     style |= {"textcoords": "offset points", "arrowprops": pointer}

@@ -87,7 +87,10 @@ PLAIN = Look()
 
 
 def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
-    """Write the figure, by default without white margins.  Raises FetiHomogError if it cannot be written."""
+    """Write the figure in the format of `look`, by default without white margins; return the file path.
+
+    Raises FetiHomogError if the file cannot be written.
+    """
     if look.title is not None:
         figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
     for text in [*figure.texts, *(axes.title for axes in figure.axes)]:
@@ -102,7 +105,7 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
 
 @contextmanager
 def missing_letters_as_boxes() -> Iterator[None]:
-    """Silence, in a `with` block, the warnings about letters that the font lacks; Matplotlib draws boxes instead."""
+    """Context manager: silence warnings about letters that the font lacks; Matplotlib draws boxes instead."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
         yield
@@ -131,7 +134,7 @@ def faint_grid(axes: Axes) -> None:
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
-    """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
+    """Draw triangles in smooth colours for nodal values (p,) at nodes `points` (p, 2); return the triangles."""
     mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
@@ -166,10 +169,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 
     Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
     zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
-    default: meshes are fine at tips, where stresses are singular.
-
-    Returns:
-        colour range, colour map, and the ends of the range beyond which values lie.
+    default: meshes are fine at tips, where stresses are singular.  Returns range, map, and the ends as `value_range`.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
@@ -189,10 +189,7 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
     """Choose the colour range of a field.
 
     At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
-    one colour.
-
-    Returns:
-        colour range, and the ends of the range beyond which values lie.
+    one colour.  Returns the range, and the ends beyond which values lie: "min", "max", "both" or "neither".
     """
     low, high = float(values.min()), float(values.max())
     if high - low <= 0.01 * max(abs(low), abs(high), 1e-300):
@@ -217,7 +214,7 @@ def _outside(values: Array, bottom: float, top: float) -> str:
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
-    """Choose a displacement factor: 1, 2 or 5 times a power of ten, at most `largest`.
+    """Choose a displacement factor: 1, 2 or 5 times a power of ten, at most `largest`; 1 without displacement.
 
     The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
     """

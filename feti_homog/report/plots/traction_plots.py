@@ -96,7 +96,7 @@ def _limit(axes: Axes, values: Array) -> None:
 
 
 def _chosen_states(file: Any, document: Document) -> list[str]:
-    """Choose the states to draw.
+    """Choose the states to draw; return their names in result.h5.
 
     For a path: peak (or first state), then valley or last state with tractions; else the middle of partial debonding.
     """
@@ -115,7 +115,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
 
 
 def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> None:
-    """Draw tractions or jumps around a fibre, with earlier states dashed.
+    """Draw tractions, jumps or damage around a fibre, with earlier states dashed.
 
     The background marks the debonded part in the last state.
     """

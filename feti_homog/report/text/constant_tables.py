@@ -36,7 +36,7 @@ MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return tables of L^ef, also under minus the unit strains.  All entries have as many decimals as the largest."""
+    """Return tables of effective stiffnesses, also under minus the unit strains, and of their mesh errors."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -49,7 +49,7 @@ def stiffnesses(document: Document) -> list[Table]:
 
 
 def conductivity(document: Document) -> list[Table]:
-    """Return tables of k^ef and its mesh errors, with closed forms and bounds across the fibres."""
+    """Return tables of the effective conductivity, its mesh errors, and its bounds and estimates."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
     title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
     matrices = (title, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
@@ -107,7 +107,7 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
 
 
 def thermal(document: Document) -> list[Table]:
-    """Return tables of the thermal constants: a row per component, a column per known quantity."""
+    """Return a table of thermal constants in a list, a row per component, a column per quantity; or []."""
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
@@ -131,7 +131,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of computed constants between their bounds; values outside are marked."""
+    """Return a table of constants between bounds, or a title alone; marks show values beyond Reuss and Voigt."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -231,7 +231,7 @@ def table(document: Document) -> Table:
 
 
 def sensitivities(document: Document) -> list[Table]:
-    """Return tables of elasticities d ln c / d ln p and derivatives dc / dp; none without sensitivities."""
+    """Return tables of elasticities d ln c / d ln p and derivatives dc / dp for constants c, parameters p; or []."""
     if (section := document.get("sensitivities")) is None:
         return []
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4

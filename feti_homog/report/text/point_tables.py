@@ -60,7 +60,7 @@ def angle_table(document: Document, limit: int | None = None) -> Table:
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
-    """Set the columns of values (n, c) to zero that contain only solver noise."""
+    """Return the values (n, c), with zero in columns that contain only solver noise."""
     columns = np.array(values, float)
     is_there = np.isin(np.arange(columns.shape[1]), path_curves.components_above(path_curves.ZERO, columns))
     return np.where(is_there, columns, 0.0)
@@ -146,7 +146,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return tables of the largest G for each angle and load; for a single load, with all numbers of the tip."""
+    """Return tables of the largest G for each angle and load, [] without tips; one load has all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
@@ -157,7 +157,7 @@ def angle_tip_table(document: Document) -> list[Table]:
 
 
 def _largest(tips: Document | None) -> dict[str, Document]:
-    """Return the tip with the largest G for each load, in load order."""
+    """Return the tip with the largest G for each load, in load order; {} without tips."""
     best: dict[str, Document] = {}
     names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():

@@ -62,10 +62,8 @@ def summary(document: Document) -> str:
     """Return the printed summary of a result.
 
     The summary has cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
-    Lines have up to 79 characters, tables up to 100, except for long names.
-
-    Raises:
-        KeyError: the document lacks a required key.
+    Lines have up to 79 characters, tables up to 100, except for long names.  Raises KeyError if the document lacks a
+    key.
     """
     size, solver = document["memory"], document["solver"]
     names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
@@ -103,7 +101,7 @@ def short_summary(document: Document) -> str:
 
 
 def notebook(document: Document) -> str:
-    """Return the title, tables, checks and status of a result as HTML."""
+    """Return the title, tables with at most 20 points, checks and status of a result as HTML."""
     tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
@@ -250,7 +248,7 @@ def phase_tables(document: Document) -> list[Table]:
 
 
 def _states(document: Document, count: int) -> Sequence[int]:
-    """Return the numbers of the states that the tables show."""
+    """Return the numbers of the states in the tables of phase stresses."""
     if "path" in document and "states" in document:
         from feti_homog.results import landmarks  # of paths alone
 
@@ -261,6 +259,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value and its position in words, "-" for the value zero."""
+    """Return a value without noise, and its position in words, "-" for the value zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"
