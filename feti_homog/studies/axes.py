@@ -104,7 +104,7 @@ def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> lis
 
 
 def _is_foreign(path: toml_files.TomlPath) -> bool:
-    """Return whether a path lies outside the sections whose keys can vary."""
+    """Return whether a sweep cannot vary the keys in the section of a path."""
     return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP)
 
 
@@ -150,7 +150,7 @@ def rounded(value: float) -> float:
 
 
 def _of_key(value: float, path: toml_files.TomlPath) -> Any:
-    """Round a value, to an integer if the key accepts only integers."""
+    """Round a value to DIGITS digits, or to an integer if the key accepts only integers."""
     value = rounded(value)
     section = sections.SECTIONS.get(path[0])
     entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

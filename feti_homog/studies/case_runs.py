@@ -43,7 +43,7 @@ def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
 def run_all(
     sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool | None
 ) -> None:
-    """Run all sweep cases.  Collective.
+    """Run all sweep cases, with `retry` also failed ones again.  Collective.
 
     A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `quiet` True
     nothing is printed; with None the first group shows the progress; with False it also prints a line for each case.
@@ -113,7 +113,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Make the sweep folder and hold its lock, which jobs of single cases share.  Collective."""
+    """Context manager: make the sweep folder and hold its lock, which jobs of single cases share.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -179,10 +179,11 @@ class CaseRunner:
         timeout: float = file_locks.LOCK_TIMEOUT_S,
         advance: Callable[..., Any] = lambda *_: None,
     ) -> tuple[Outcome, str]:
-        """Run a case unless it has finished or failed, or another process holds it.  Collective.
+        """Run a case unless it is finished, failed without `retry`, or held by another process.  Collective.
 
         The group waits `timeout` seconds for the lock of the case; `advance` shows the share of all cases.  Returns the
-        outcome, and the name of another process that holds the case.  Raises FetiHomogError if it cannot write.
+        outcome, and the name of another process that holds the case, else "".  Raises FetiHomogError if it cannot
+        write.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
@@ -216,7 +217,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Acquire the lock of a case, and keep the lock if the case must run.  On one rank."""
+        """Acquire the lock of a case, and keep the lock if the case must run.  On one rank.  Returns as `run` does."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)
@@ -241,9 +242,7 @@ class CaseRunner:
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
-    """Return the description of a case, or of a sweep and its first case.  Collective.
-
-    The text is empty except on rank 0.
+    """Return the description of a case, or of a sweep and its first case; empty except on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: the document is faulty, or the cell of its first case.
@@ -257,7 +256,10 @@ def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
 
 
 def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
-    """Return a heading and the description of the first case.  Collective.  Raises like `describe`."""
+    """Return a heading and the description of the first case; empty except on rank 0.  Collective.
+
+    Raises like `describe`.
+    """
     check_options(sweep)
     text = description.describe(sweep.cases[0], comm)
     return f"{heading}\n{text}" if comm.rank == 0 else ""

@@ -30,9 +30,7 @@ def read(directory: Path) -> SweepTable:
 def collect(directory: Path, pictures: bool) -> list[str]:
     """Write the tables and the picture of a sweep to its folder; return the lines to print.  On one rank.
 
-    Raises:
-        CaseError: as for `read`.
-        FetiHomogError: a file cannot be written.
+    Raises CaseError as `read`, and FetiHomogError if a file cannot be written.
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
@@ -80,8 +78,7 @@ def means(table: SweepTable) -> list[str]:
 def write(directory: Path, table: SweepTable) -> list[Path]:
     """Write cases.csv and statistics.csv atomically, and return their paths.  On one rank.
 
-    Raises:
-        FetiHomogError: a file cannot be written.
+    Raises FetiHomogError if a file cannot be written.
     """
     columns = [*table.inputs.values()]
     for name, values in table.outputs.items():

@@ -57,11 +57,7 @@ class Fit(Study):
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
-        """Return the cases for pairs of a test number and unknowns (n,).
-
-        Raises:
-            CaseError: with the faults of all cases.
-        """
+        """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
             """Restrict the output to numbers, with derivatives unless debonded faces may touch."""
@@ -152,7 +148,10 @@ class Evaluations:
     computed: dict[Point, Float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
-        """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
+        """Estimate the unknowns; return the estimates on rank 0, which directs the others, else None.  Collective.
+
+        All ranks raise CaseError or ConvergenceError if the search fails.
+        """
         comm = self.evaluator.comm
         if comm.rank:
             while (question := comm.bcast(None)) is not None:
@@ -229,7 +228,7 @@ class Evaluations:
         steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
 
         def end(k: int, step: float) -> Point:
-            """Return the point a step of unknown k away, within the bounds."""
+            """Return the unknowns after a step of unknown k, within its bounds."""
             return _rounded([*key[:k], np.clip(key[k] + step, *bounds[k]), *key[k + 1 :]])
 
         ends = [end(k, step) for (k, _), step in steps.items()]
@@ -255,7 +254,10 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
-        """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
+        """Run cases for pairs of a test number and unknowns.  Collective.
+
+        Returns pairs of result document and computed data on rank 0, [] elsewhere.
+        """
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

@@ -114,9 +114,9 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
 
 
 def _phases(document: Document) -> dict[str, float]:
-    """Return the largest stresses of the phases by column name.
+    """Return the largest stresses and utilisations of the phases by column name.
 
-    Each column is for one load; for angles and paths, it has the largest stress of all states.
+    Each column is for one load; for angles and paths, it has the largest value of all states.
     """
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
     for phase in document.get("phase_stresses", ()):

@@ -41,7 +41,7 @@ class Evaluator:
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.
 
-        Returns result.json of all cases on rank 0; [] elsewhere.  Raises ConvergenceError if cases failed.
+        Returns result.json of all cases on rank 0; [] elsewhere.  Raises like `case_runs.run_all`.
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
@@ -102,8 +102,7 @@ class Study(ABC):
     def describe(self, comm: Intracomm) -> str:
         """Return a description of the study and its first case; empty except on rank 0.  Collective.
 
-        Raises:
-            CaseError, MeshError: the cell of the first case is faulty.
+        Raises CaseError or MeshError if the cell of the first case is faulty.
         """
         heading = mpi_errors.on_root(comm, self.heading)
         return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)

@@ -130,9 +130,8 @@ class SweepTable:
     def curves(self, point: int) -> tuple[Float, Float]:
         """Return the stress-strain curves at a point of the sweep, interpolated to common strains.
 
-        Returns:
-            Strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of one
-            leg whose strain rises with the load.  Both are empty if n = 0.
+        Returns strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of
+        one leg on which the strain rises with the load.  Both are empty if n = 0.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
@@ -155,7 +154,7 @@ class Series:
 def series_over(table: SweepTable, key: str) -> list[Series]:
     """Group the points with finished cases into series over a key.
 
-    A second key with a one-to-one relation to the first does not split a series.
+    A second key that is a function of the first does not split a series.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
     along = list[str]()
