@@ -1,7 +1,8 @@
 """Evaluate bond laws by independent formulas, and select the law at interface nodes.
 
 A law is a class, here or in `softening`, with the name that `case/bond_laws.py` lists.  Tractions (k, c) have a normal
-and a tangential component, and an axial one in generalized plane strain.
+and a tangential component, and an axial one in generalized plane strain: t_n, t_t, t_a.  <t_i> is the magnitude of
+component i, but 0 for a normal compression; R_i is its strength, k_i its stiffness.
 """
 
 from abc import ABC, abstractmethod
@@ -58,7 +59,7 @@ class BondLaw(ABC):
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
-        """Return the fracture energies per area (k,) in modes psi (k,)."""
+        """Return the fracture energies per area (k,) in modes psi (k,); 0 for laws without toughness."""
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
@@ -114,7 +115,7 @@ class QuadraticStrength(MaxStrength):
 class SpringEnergy(BondLaw):
     """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
 
-    The spring energies are G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
+    With toughness G_Ic, mode sensitivity lambda, G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
     """
 
     has_toughness: ClassVar[bool] = True

@@ -165,7 +165,7 @@ def _isotropic_part(c: Float) -> tuple[float, float]:
 
 
 def _distance(C: Float, other: Float) -> float:
-    """Compute the relative distance ||C - C'|| / ||C|| between tensors C_ijkl."""
+    """Compute the relative distance ||C - C'|| / ||C|| of the tensor C_ijkl from `other`, C'."""
     voigt = VOIGT[len(C)]
     off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
     return float(off / size)

@@ -1,7 +1,6 @@
 """Check that states and result.json have the loads of the case, and that their numbers agree.
 
-A case prescribes the strain or the stress of each of n components; in generalized plane strain the temperature is the
-last strain component.
+A case prescribes the strain or stress of n components; in generalized plane strain the last strain is the temperature.
 """
 
 import json
@@ -95,8 +94,8 @@ class StateNumbers(State):
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.
         released: (k,) whether a bond is at a tip that breaks by energy release.
         used: (k,) utilisation at bonded nodes, NaN where `released`, else 0.
-        heat: conjugate of the temperature, -<alpha : sigma>.
-        expanding: <alpha : L : strain>.
+        heat: conjugate of the temperature T, -<alpha : sigma> with the expansions alpha.
+        expanding: <alpha : L : strain> with the stiffnesses L.
     """
 
     stored: float

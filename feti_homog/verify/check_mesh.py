@@ -107,8 +107,8 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     """Compute normals (k, 2) and tributary lengths (k,) from the mesh, and whether they are exact (k,).
 
-    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or int N ds over its
-    quadratic sides; the normal is the mean of the normals of the sides, weighted by these lengths.
+    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or the integral of
+    its shape function over its quadratic sides; the normal is the mean of side normals, weighted by these lengths.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Return whether interface nodes (k,) are inside an arc, and whether they are outside all arcs."""
+    """Return whether nodes (k,) are inside an arc, and whether outside all; `opening`: default angle in degrees."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]

@@ -83,7 +83,7 @@ def _parameters(cell: DiscreteCell) -> set[str]:
 
 
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check effective constants and their derivatives `slope` (v, v) along `direction` (parameters,).
+    """Check effective constants and their derivatives `slope`, (v, v) or (6, 7), along `direction` (parameters,).
 
     At fixed contact status, energies are stationary, which gives the derivatives of the diagonal C_kk.  Others need
     fields under other loads with the same status, which are not in the files: there only values are checked.

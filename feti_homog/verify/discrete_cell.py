@@ -133,7 +133,7 @@ class DiscreteCell:
 
     @cached_property
     def reuss(self) -> Float:
-        """Compute <L^-1>^-1 (v, v), the lower bound of the bonded cell's stiffness."""
+        """Compute <L^-1>^-1 (v, v) of the phase stiffnesses L, the lower bound of the bonded cell's stiffness."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
     @cached_property
@@ -183,7 +183,10 @@ class DiscreteCell:
         return self.integrals(self.sides.on_side)
 
     def integrals(self, which: Bool) -> Float:
-        """Compute int N_a n ds (nodes, 2), n inwards: sum_b int N_a dN_b/ds x_b on a side, rotated to the normal."""
+        """Compute int N_a n ds (nodes, 2) over the sides `which`; N_a are shape functions, normals n point inwards.
+
+        On a side this is sum_b int N_a dN_b/ds x_b with nodes x_b, rotated to the normal.
+        """
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
         nodes = self.sides.nodes[which]
         M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2

@@ -30,7 +30,7 @@ class ElementFields:
     Attributes:
         strain, stress: (m, v) element means.
         strain_size: (m,) size of the terms whose sum is the strain, which bounds the rounding.
-        force: (n, c) int B^T sigma.
+        force: (n, c) nodal forces int B^T sigma for strains B u.
         force_size: (n,) size of the terms whose sum is the force.
         largest_force: largest nodal force of a single element.
         energy: int sigma : eps.
@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu of mixed phases, and largest mu / least mu of mixed phases; or 0."""
+        """Return the largest lambda / mu (Lame) of mixed phases, and largest mu / least mu of mixed phases; else 0."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -178,8 +178,7 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
 def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
     """Compute du_i/dx_d (e, q, 2, 2) of the bubbles, and the pressures (e, q).
 
-    Arguments are the gradients dN_a/dx (e, q, 6, 2), the weights (e, q), the elastic strains (e, q, v) without bubbles,
-    and lambda and mu (e, 2).
+    Arguments: dN_a/dx (e, q, 6, 2), weights (e, q), elastic strains (e, q, v) without bubbles, lambda and mu (e, 2).
     """
     (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)

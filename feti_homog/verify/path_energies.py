@@ -149,7 +149,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Bound the potential of a load from below and above by (P), with another state of the same bonds."""
+    """Bound the potential of a load from below and above by (P) and a state of the same bonds; else by infinities."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)

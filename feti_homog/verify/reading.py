@@ -170,7 +170,7 @@ class ResultFiles:
 
     @property
     def points(self) -> Points:
-        """Return the points of a path or of angles, or the single load."""
+        """Return the points of a path or of angles, or the single load; [] for other analyses."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Open the results in a folder; raise a one-line CaseError if a file is unreadable."""
+    """Context manager: open the results in a folder.  Raises CaseError, of one line, for an unreadable file."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {
@@ -236,7 +236,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    """Read result.json; raise CaseError if it is unreadable or has another schema."""
+    """Read result.json.  Raises CaseError if it is damaged or has another schema, and as `input_files.unreadable`."""
     try:
         document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:
