@@ -247,7 +247,7 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note if the mesh error under the first load that is not zero exceeds `accuracy`.  Collective."""
+    """Note a mesh error above `accuracy` under the first load that is not zero.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))
@@ -260,12 +260,12 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return the entry `mesh_error`: largest relative error of strain energy under any strain; {} without errors."""
+    """Return the entry `mesh_error`, the largest relative energy error under any strain; {} without errors."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return the errors of `effective_stiffness` and `thermal_stress` for a part `name` of PARTS; {} without errors."""
+    """Return one part `name` (of PARTS) of the errors of stiffness and thermal stress; {} without errors."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -273,7 +273,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return the constants of a stiffness by name, with `thermal_expansion`; of (6, 6) also nu31 and nu32."""
+    """Return the constants of a stiffness by name.  Of (6, 6) they include nu31, nu32 and, with heat, expansions."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}

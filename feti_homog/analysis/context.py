@@ -43,7 +43,7 @@ class CellLoads:
         self.names = tuple(name for problem in self.problems for name in problem.loads)
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """Return the load of a waypoint, a mapping of strains or stresses; stresses without a value are 0."""
+        """Return the load of a waypoint, which maps names of strains and stresses to values.  Other stresses are 0."""
         stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
@@ -151,11 +151,11 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, so that keeping factors pays off."""
+        """Return whether the run recovers interior displacements repeatedly, which makes factors worth their memory."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
-        """Return the initial bond state, with debonded nodes; `opening` is the default angle of arcs in degrees."""
+        """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
 
     def unit_responses(
@@ -206,7 +206,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return a point's debonding, under the last plane response, and its iterations, as entries.  Collective."""
+        """Return the entries of a point: debonding under the last plane response, and iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -136,7 +136,7 @@ def _points(
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with a remedy; `place` on the path is empty before the first point."""
+    """Return the error that ends a path, with a remedy.  Before the first point `place` is empty."""
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
         return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -236,7 +236,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a path point by products F lambda, F the dual operator; check the responses.  Collective."""
+    """Complete a path point by products with the dual operator, and check its responses.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

@@ -162,7 +162,7 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
 
 
 def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces) -> path_points.Point:
-    """Solve again for the equilibrium of a point whose event has no multipliers; return the new point.  Collective."""
+    """Return a point with its equilibrium solved again, for an event without multipliers.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -268,7 +268,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
-    """Count this rank's bonds that part; -1 for wrong arrays, impossible numbers, or bonds that heal."""
+    """Count this rank's bonds that part.  Returns -1 for wrong arrays, impossible numbers, or bonds that heal."""
     kept = {name: of for name, of in layout.items() if "lam" in event or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != kept:
         return -1

@@ -43,7 +43,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return energy release rates at all tips under the in-plane ones of `loads`; empty without tips.  Collective."""
+    """Return energy release rates at all tips under in-plane `loads`.  They are empty without tips.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
@@ -85,7 +85,7 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
 
 
 def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> tuple[float, float]:
-    """Return the fibre number, from 1, and the direction of a new point's most utilised bond.  Collective.
+    """Return fibre number, from 1, and direction of a new point's most utilised bond.  Collective.
 
     Ties: lowest fibre, then direction (degrees).  Returns (NaN, NaN) if no bond carries more than the solver's error.
     """
@@ -103,7 +103,7 @@ def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_point
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return the [[interface]] section numbers, from 1, of `pair`; None if the case has at most one section."""
+    """Return [[interface]] section numbers, from 1, for indices `pair`.  None: the case has at most one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 

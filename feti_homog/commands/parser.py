@@ -49,7 +49,7 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A command-line parser whose errors are CaseError; the program prints the error and exits with code 2."""
+    """A command-line parser that raises CaseError for errors, so that the program exits with code 2."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")

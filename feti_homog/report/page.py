@@ -41,7 +41,7 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def write(directory: Path) -> Path:
-    """Write `directory`/report.html from result.json and the pictures in the folder; return its path.
+    """Write `directory`/report.html from result.json and the stored pictures; return its path.
 
     Call on one rank.
 

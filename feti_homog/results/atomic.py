@@ -16,7 +16,7 @@ from feti_homog.system.runtime import file_locks
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Replace the file `path` by the output of `write`, in one step; return `path`.
 
-    `write` gets the name of an unfinished file in the same folder, which any exception removes.
+    `write` gets the name of an unfinished file in the same folder.  After any exception the unfinished file is removed.
 
     Raises:
         FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
@@ -53,7 +53,7 @@ def commit(part: Path, path: Path) -> None:
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write `content` at position `start` of a file, and drop all former bytes from there on.
+    """Write `content` at position `start` of a file; drop all former bytes from there on.
 
     At position 0 the function creates the file and its folder.  If the content `lasts`, it waits until the bytes are on
     the disk.  A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises
@@ -71,7 +71,7 @@ def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
 
 
 def rename(old: Path, new: Path) -> None:
-    """Rename a file or folder; wait until the name is on the disk if the file system allows it.  Raises OSError."""
+    """Rename a file or folder, and wait until the name is on the disk, if possible.  Raises OSError."""
     os.replace(old, new)
     with contextlib.suppress(OSError):  # not every file system synchronises folders
         _synchronise(new.parent)

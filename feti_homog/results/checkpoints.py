@@ -51,7 +51,7 @@ def room_of(case: Case) -> int | None:
 
 
 class EventsInMemory:
-    """A store of distributed events in memory, for runs without files; every method is collective.
+    """A store of distributed events in memory, for runs without files.  Every method is collective.
 
     Attributes:
         room: total size in bytes, beyond which further events have no multipliers; None without a limit.
@@ -95,7 +95,7 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return an event to store; without multipliers and jumps if `size` bytes of events fill the room."""
+        """Return an event to store.  It has no multipliers and jumps if `size` bytes of events fill the room."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
@@ -174,7 +174,7 @@ def record(content: bytes) -> bytes:
 
 
 def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
-    """Yield the end position and the content of each record in an event file, up to an incomplete record.
+    """Yield the end position and the content of each complete record in an event file.
 
     Reading begins at the first record, or at `start`, the end position of a record.  Raises CaseError if the file is
     unreadable or damaged, or has another format.
@@ -251,7 +251,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove it, so that no run finds a partial folder.  Call on one rank.
+    """Rename the checkpoint folder, then remove it.  Call on one rank.  So no run finds a partial folder.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.
@@ -265,7 +265,7 @@ def remove(directory: Path) -> None:
 
 
 def _remove_events(folder: Path) -> None:
-    """Remove the event file and its folder as far as possible; the next run removes the rest."""
+    """Remove the event file and its folder as far as possible.  The next run removes the rest."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
             if path.name == NAME:

@@ -114,7 +114,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 
 
 def _require_mesh(path: Path, file: Any) -> None:
-    """Require a case with all phases, elements with an area, fibres in the mesh, and interface nodes at mesh nodes."""
+    """Require elements with an area, fibres with elements, interface nodes in the mesh, and all phases in the case."""
     try:
         cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

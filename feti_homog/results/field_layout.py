@@ -37,9 +37,9 @@ class Header:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains and bodies.
+    """This rank's n nodes and m triangles, one subdomain after the other.
 
-    Each group of 4**refine consecutive triangles fills one coarse triangle.
+    Nodes are torn between subdomains and bodies.  Each 4**refine consecutive triangles fill one coarse triangle.
     """
 
     points: Float = described("positions of the nodes", records.LENGTH, "(n, 2)")
@@ -78,7 +78,7 @@ class FibrePart:
 
 @dataclass(frozen=True)
 class InterfacePart:
-    """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
+    """The k fibre-matrix interface nodes with multipliers on this rank; k may be 0."""
 
     points: Float = described("positions of the interface nodes", records.LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
@@ -149,17 +149,17 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return the descriptions, by name, of the fields of a part that become datasets, because they have rows."""
+    """Return descriptions, by name, of the fields that become datasets.  These have rows."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the values, by name, of the fields of a part that become attributes, because they have no rows."""
+    """Return values, by name, of the fields that become attributes.  These have no rows."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 
 def rows_of(description: records.Description) -> str:
-    """Return the row kind of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; else empty."""
+    """Return the row kind of a dataset: `n`, `m`, `k` or `f`, as in the module.  It is empty for attributes."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 
@@ -215,7 +215,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
-    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33]; missing `entries` are 0."""
+    """Return the view of a symmetric tensor, with missing `entries` 0.  Order: 11, 12, 13, 21, 22, 23, 31, 32, 33."""
     places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
     columns = {place: entries[entry] for place, entry in places if entry in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"

@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about the other result that a run of `case` replaces, or "".  Call on one rank.
+    """Return a line about the different result that a run of `case` replaces, or "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -116,7 +116,7 @@ def replaced(directory: Path, case: Case) -> str:
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
-    """Return the error for a foreign file with the name of a result; `kind` of program run: "run", "sweep", "fit"."""
+    """Return the error for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
     return CaseError(
         f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
         "move it away or choose another folder"
@@ -193,7 +193,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     lock = file_locks.Lock(directory / LOCK)
 
     def hold() -> tuple[list[Path], str]:
-        """Create and lock the folder; return new folders, innermost first, and a warning or an empty string."""
+        """Create and lock the folder.  Returns new folders, innermost first, and a warning or an empty string."""
         made = [path for path in (directory, *directory.parents) if not path.exists()]
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -227,7 +227,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove the result files whose names are not in `written`, and events if no log is written.  Call on one rank."""
+    """Remove result files outside `written`, and the checkpoint if no log is written.  Call on one rank."""
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

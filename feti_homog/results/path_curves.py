@@ -65,13 +65,13 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg on which a number in `counts` is not 0; else all points."""
+    """Return the points up to the end of the first leg with a positive count in `counts`; else all points."""
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield, from leg 2 on: leg number, component with the largest strain change, point of its largest stress."""
+    """Yield leg, component with the largest strain change, and point of its largest stress, from leg 2 on."""
     leg, changed = legs_of(document), changed_components(document)
     strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
     for number in range(2, legs(document) + 1):
@@ -89,7 +89,7 @@ def legs_of(document: Document) -> Float:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of (n, c) with absolute entries above `share` times the largest absolute entry."""
+    """Return the columns of (n, c) with an entry above `share` times the largest.  Magnitudes are compared."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
@@ -101,7 +101,7 @@ def shown_stresses(document: Document) -> list[int]:
 
 
 def what_rises(document: Document) -> str:
-    """Name the rising quantity on the first leg of a path: "strain" if only strains rise, else "load"."""
+    """Name the rising quantity on the first leg.  It is "strain" if only strains rise, else "load"."""
     first = targets(document)[0]
     other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
@@ -140,7 +140,7 @@ def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
 
 
 def scales_with_toughness(document: Document) -> bool:
-    """Return whether strains and stresses of a path are proportional to the root of the toughness.
+    """Return whether strains and stresses are proportional to the root of the toughness.
 
     This holds if bonds break by energy, on springs that do not depend on the toughness.
     """
@@ -150,11 +150,11 @@ def scales_with_toughness(document: Document) -> bool:
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
-    """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
+    """Return the corners (v, 2 c) of a proportional path under a rising load, stresses first.
 
     Where bonds break at a load t, all bonds that cannot carry t without them also break.  The cell then follows the
-    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
-    and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t', and
+    the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])

@@ -139,14 +139,14 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:
-    """Return the record fields that fill columns: numbers, and arrays with named components."""
+    """Return the record fields that fill columns.  These are numbers, and arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV, with an apostrophe before strings that a spreadsheet would evaluate."""
+    """Return rows as CSV.  An apostrophe precedes strings that a spreadsheet would evaluate."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -154,9 +154,10 @@ def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
 
 
 class EventLog:
-    """The event log in a result folder, which rank 0 writes; the first line replaces an earlier log.
+    """The event log in a result folder, which rank 0 writes.
 
-    After a write error `say` gets one warning, and the path continues without the log, which holds no results.
+    The first line replaces an earlier log.  After a write error, `say` gets a warning, and the path continues without
+    it.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
@@ -195,7 +196,7 @@ def dumps(document: Mapping[str, Any]) -> str:
 
 
 def loads(text: str) -> dict[str, Any]:
-    """Parse a document and verify its checksum, if it has one; return the document without the checksum.
+    """Parse a document, verify its checksum, if any, and remove the checksum.
 
     Raises ValueError if the text is not JSON or not a table, or does not match its checksum.
     """
@@ -265,7 +266,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize a value with indents; an array of numbers, or a row of a matrix, takes one line."""
+    """Serialize a value with indents.  An array of numbers, or a row of a matrix, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

@@ -98,7 +98,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Read a state at the interface nodes: displacements of both faces, tractions, jumps, bond status, geometry."""
+    """Read a state at the interface nodes.  Arrays: displacements of both faces, tractions, jumps, status, geometry."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
@@ -176,7 +176,7 @@ def _grid(state: ViewedState) -> ET.Element:
 
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
-    """Write a .vtkhdf file: the common mesh, and the fields of each state, which `read(file, number)` returns."""
+    """Write a .vtkhdf file with the common mesh and all states.  `read(file, number)` returns a state."""
     count = len(file.get("state", ()))
     with h5py.File(path, "w") as out:
         root = out.create_group("VTKHDF")

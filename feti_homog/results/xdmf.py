@@ -48,7 +48,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets, by field name, of state fields with one of the `shapes` that are not in LISTED."""
+    """Return the datasets, by field name, of state fields with one of the `shapes`.  LISTED datasets are left out."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -101,7 +101,7 @@ def write(directory: Path) -> list[Path]:
 
 
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
-    """Return load factor, mean strain and mean stress of a state by name, each in a row (1, c).
+    """Return load factor, mean strain and mean stress of a state as rows (1, c).
 
     The means are vectors [11, 22, 12] or, in generalized plane strain, tensors; the temperature is then added.
     """

@@ -18,7 +18,7 @@ Assignment = dict[toml_files.TomlPath, Any]
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that varies, with a list of values or, for samples, both ends of a range."""
+    """A key that varies.  It has a list of values or, for samples, both ends of a range."""
 
     path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
@@ -91,7 +91,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
 
 
 def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
-    """Draw a Latin hypercube, or independent samples, from the box of the axes."""
+    """Draw a Latin hypercube, or independent samples, from the box of the axes.  `settings` has number and seed."""
     count = settings.samples or 1
     if settings.sampling == "latin":
         from scipy.stats import qmc  # a slow import that few sweeps need
@@ -114,7 +114,7 @@ def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, or an empty string; sampled ranges need neither step nor count."""
+    """Return the fault of an axis, or an empty string.  Sampled ranges need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"

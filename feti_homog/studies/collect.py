@@ -28,9 +28,9 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write the tables and the picture of a sweep to its folder; return the lines to print.  On one rank.
+    """Write the tables and the picture of a sweep to its folder.  On one rank.
 
-    Raises CaseError as `read`, and FetiHomogError if a file cannot be written.
+    Returns the lines to print.  Raises CaseError as `read`, and FetiHomogError if a file cannot be written.
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
@@ -53,7 +53,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return printed tables of peaks or constants: means and scatter over realisations, or values at points."""
+    """Return printed tables of peaks or constants.  They show scatter over realisations, or values at points."""
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names

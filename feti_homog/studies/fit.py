@@ -82,12 +82,12 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the slice of all data that holds the data of a test."""
+        """Return the data of a test as a slice of all data."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on measured names whose meaning differs in ply axes, or an empty string."""
+        """Return a line on measured names that have another meaning in ply axes, or an empty string."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -148,9 +148,9 @@ class Evaluations:
     computed: dict[Point, Float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
-        """Estimate the unknowns; return the estimates on rank 0, which directs the others, else None.  Collective.
+        """Estimate the unknowns on rank 0, which directs the other ranks.  Collective.
 
-        All ranks raise CaseError or ConvergenceError if the search fails.
+        Other ranks return None.  All ranks raise CaseError or ConvergenceError if the search fails.
         """
         comm = self.evaluator.comm
         if comm.rank:
@@ -169,7 +169,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start; after a misfit or a fault, also from the best of `STARTS` points.  On rank 0."""
+        """Search from the start.  After a misfit or fault, search from the best of `STARTS` points.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
@@ -211,7 +211,7 @@ class Evaluations:
         return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,); by finite differences if necessary.  On rank 0.
+        """Return the derivatives (m, n) of the data at x (n,), where necessary differences.  On rank 0.
 
         With a softening law of few teeth, a step may change no datum: that side of the difference is then computed
         again with twice the step, up to a tenth of the width of the bounds.

@@ -112,7 +112,7 @@ def responses(document: path_curves.Document) -> dict[str, float]:
 
 
 def _values(document: path_curves.Document) -> dict[str, float]:
-    """Return the result numbers by their names in a fit file."""
+    """Return the numbers of a result under the names that a fit file uses."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
@@ -136,7 +136,7 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return the exact derivatives (m,) of the computed values with respect to an unknown, or None.
+    """Return the exact derivatives (m,) of computed values with respect to an unknown, or None.
 
     Elastic constants do not depend on strengths, nor, in a plane, on expansions.  With a single interface the loads at
     breaks are homogeneous: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not
@@ -180,10 +180,9 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
-    """Interpolate the stress S of a path, and the slope dS/dE, at the strain E of a datum.
+    """Interpolate a path's stress S, and its slope dS/dE, at the strain E of a datum.
 
-    Raises CaseError if another strain component rises along the path, the path ends below the strain, or the signs
-    differ.
+    Raises CaseError if another strain component rises along the path, the path ends below E, or the signs differ.
     """
     curve = path_curves.rising_strain(document)
     strains, stresses = voigt.voigt_names(len(document["path"][0]["stress"]))

@@ -43,7 +43,7 @@ class Statistics:
 
 @dataclass(frozen=True, repr=False)
 class SweepTable:
-    """The table of a sweep, with a row for each case; see `pandas.DataFrame({**table.inputs, **table.outputs})`.
+    """The table of a sweep, with a row for each case.  See `pandas.DataFrame({**table.inputs, **table.outputs})`.
 
     Attributes:
         name, stress_unit: as in the sweep.
@@ -90,7 +90,7 @@ class SweepTable:
 
     @property
     def stated(self) -> list[str]:
-        """The names of all outputs except times, memory, checks, and outputs that are zero in all cases."""
+        """The names of outputs, except times, memory, checks, and outputs that are zero in all cases."""
         names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
         return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 
@@ -100,7 +100,7 @@ class SweepTable:
         return [document for document in self.documents if document is not None]
 
     def input_of(self, point: int, name: str) -> Any:
-        """Return the value of an input at a point, or None if the point does not set it."""
+        """Return the value of an input at a point.  None: the point does not set the input."""
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:
@@ -144,7 +144,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points that differ by one key only; `x` has the ascending values of the key."""
+    """A series of sweep points that differ by one key only.  `x` has the ascending values of the key."""
 
     label: str
     points: list[int]

@@ -27,7 +27,7 @@ DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, M
 
 @dataclass(frozen=True)
 class Certificate:
-    """The findings of all laws that apply; `title` names case, mesh and states.
+    """The findings of all laws that apply.  `title` names case, mesh and states.
 
     `status` has the status and faults that the run reports; `unchecked` maps reasons to numbers that no law reads.
     """
@@ -100,7 +100,7 @@ def checks_of(cell: DiscreteCell) -> list[Finding]:
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
-    """Check mesh, interface and the fields of all states; return the states without mesh fields."""
+    """Check mesh, interface and the fields of all states.  Returns the states without mesh fields."""
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)

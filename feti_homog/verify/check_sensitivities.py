@@ -24,7 +24,7 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants, and their derivatives along one change of all parameters."""
+    """Check the values of all constants, and derivatives along one change of all parameters."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):
@@ -158,7 +158,7 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
 
 
 def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
-    """Return the table and key of a parameter, and its index in an array, or () for a scalar."""
+    """Return the table and key of a parameter, and its array index.  The index of a scalar is ()."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):

@@ -53,7 +53,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
-    """Return for each phase (phases,) whether its quadratic elements have a bubble and a pressure.
+    """Return whether quadratic elements of each phase (phases,) have a bubble and a pressure.
 
     Elements of isotropic phases are mixed, except in plane stress and conduction.  In an isotropic phase one modulus
     and one ratio give all constants, up to rounding.  Raises like `laws`.
@@ -100,7 +100,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
 
 
 def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
-    """Return the constants of a phase; raise CaseError if it has no material."""
+    """Return the constants of a phase.  Raises CaseError if it has no material."""
     materials = case["material"]
     constants = materials.get(phase, materials.get(phase.partition(":")[0]))
     if not isinstance(constants, Mapping):
@@ -109,7 +109,7 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6); an empty array (0, 0) without it."""
+    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6).  Without it the result is (0, 0)."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 

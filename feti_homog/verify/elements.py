@@ -46,7 +46,7 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh; quadratic elements of `mixed` phases have a bubble and a pressure."""
+    """The elements of a mesh.  Quadratic elements of `mixed` phases have a bubble and a pressure."""
 
     def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu (Lame) of mixed phases, and largest mu / least mu of mixed phases; else 0."""
+        """Return the largest lambda / mu, and the largest mu of any phase / mu, of mixed phases; 0 without these."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))

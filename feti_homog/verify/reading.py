@@ -56,7 +56,7 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN where they are undefined.
+    """The f fibres: bodies (f,), centres (f, 2) and radii (f,), NaN where undefined.
 
     `strength` (f,) is the strength of bonds / the strength in the case.
     """
@@ -124,7 +124,7 @@ def gradient(strain: Float) -> Float:
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """An open result folder; `size` (2,) is the size of the cell, `altered` names files changed since the run."""
+    """An open result folder.  `size` (2,) is the size of the cell, `altered` names files changed since the run."""
 
     document: Section
     size: Float
@@ -163,14 +163,14 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]], with conductances as axial stiffnesses; empty if all bonds are perfect."""
+        """Return the sections [[interface]], [] for perfect bonds.  Conductances become axial stiffnesses."""
         sections: Any = self.case.get("interface", [])
         sections = sections if isinstance(sections, list) else [sections]
         return [{"axial_stiffness": row["conductance"], **row} if "conductance" in row else row for row in sections]
 
     @property
     def points(self) -> Points:
-        """Return the points of a path or of angles, or the single load; [] for other analyses."""
+        """Return the points of a path or of angles, or the single load.  [] for other analyses."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
@@ -195,7 +195,7 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Return the names of files changed since the run; raise CaseError if a file is unreadable."""
+    """Return the names of files changed since the run.  Raises CaseError if a file is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)

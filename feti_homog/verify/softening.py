@@ -46,7 +46,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) absorbed as damage rises from `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area (k,) absorbed by damage in modes psi (k,).  Damage (k,) rises from `before`."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -69,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,): openings have a constant ratio, in the pure mode of larger end / delta_0."""
+        """Compute damage levels (n + 1,) of openings in a constant ratio, in the mode of the larger end / delta_0."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
@@ -173,9 +173,9 @@ class ExponentialLaw(Cohesive):
     last = -float(np.log(TAIL))
 
     def branch(self, u: Float) -> Float:
-        """Compute exp(-u)."""
+        """Compute traction / peak = exp(-u)."""
         return np.asarray(np.exp(-u))
 
     def under(self, u: Float) -> Float:
-        """Compute 1 - exp(-u)."""
+        """Compute the area 1 - exp(-u) under the branch."""
         return np.asarray(1.0 - np.exp(-u))

@@ -39,7 +39,7 @@ out: far above the noise of irregular meshes in symmetric cells (1e-6), below th
 
 @dataclass(frozen=True, eq=False)
 class EffectiveMaterial:
-    """A linear elastic material in card axes: 1 along the fibre, 2 and 3 along x1 and x2 of the cell.
+    """A linear elastic material in card axes, with axis 1 along the fibre.
 
     Attributes:
         name: case name.
@@ -47,7 +47,7 @@ class EffectiveMaterial:
         stress_unit: the case's label, empty if it has none.
         symmetry: in words.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
-            positive definite.
+            positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.
         errors: estimated mesh errors, by name of constant or expansion.
     """
@@ -152,7 +152,7 @@ def _material(
 
 
 def require_done(document: Document) -> None:
-    """Raise CaseError, with the first fault, if a result did not converge or has other faults."""
+    """Raise CaseError for a result that did not converge or has other faults; quote its first fault."""
     if document["status"] != "done":
         faults = document.get("faults") or ["it was not finished"]
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""

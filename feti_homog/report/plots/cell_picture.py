@@ -61,15 +61,14 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
 
 
 def _cyclic_colours(count: int) -> Array:
-    """Return colours (count, 4) around the colour circle, from blue on; none of them is grey."""
+    """Return colours (count, 4) around the colour circle, from blue on.  None of them is grey."""
     return np.asarray(mpl.colormaps["hsv"]((0.58 + TURN * np.arange(count)) % 1.0))
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
+    """Draw the subdomains, coloured one by one or, on several ranks, by rank.
 
-    A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers on
-    them.
+    A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
@@ -99,7 +98,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 
 
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
-    """Draw the cell coloured by its mesh error density; return None without finite errors.
+    """Draw the cell coloured by its mesh error density.  Returns None without finite errors.
 
     The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips lie
     above the colour range: otherwise the rest of the cell would have one colour.
@@ -132,7 +131,7 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
 
 
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array, look: plot_helpers.Look) -> tuple[Figure, Axes]:
-    """Draw the cell with triangle colours (q, 4) and body outlines; return figure and axes."""
+    """Draw the cell with triangle colours (q, 4) and body outlines.  Returns figure and axes."""
     picture, axes = drawn_cell.figure_of(cell.file.attrs, look)
     points, triangles = cell.drawn.points, cell.drawn.triangles
     # Each triangle has its own nodes, for sharp colours; antialiasing would leave seams.
@@ -252,7 +251,7 @@ def is_axial(state: Any) -> bool:
 
 
 def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
-    """Draw about twelve contour lines of the axial displacement or temperature; return the step between lines."""
+    """Draw about twelve contour lines of axial displacement or temperature.  Returns the step between lines."""
     displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
     levels = MaxNLocator(12, steps=(1, 2, 5, 10)).tick_values(displacement.min(), displacement.max())
     x, y = drawn.points.T

@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Number the node positions in each body (p,): torn nodes at the same position have the same number."""
+        """Number the node positions in each body (p,).  Torn nodes at the same position have the same number."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
@@ -122,7 +122,7 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
-    """Apply `function` to the blocks of a table, with rows in groups (g, group, columns); join the results."""
+    """Apply `function` to the blocks of a table, and join the results.  Blocks have shape (g, group, columns)."""
     step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])

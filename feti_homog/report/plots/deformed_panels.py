@@ -73,9 +73,9 @@ class DeformedCell(drawn_cell.DrawnCell):
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
+        """Draw the cell in a state, with its nodes at `moved` (p, 2).
 
-        The end of a path has its own colour range if its stresses are more than twice the earlier stresses.
+        Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         attributes = state.attrs
@@ -99,7 +99,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; if there are two bars, both have titles."""
+        """Draw the colour bar of the shapes beside the axes.  If there are two bars, both have titles."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")
@@ -231,7 +231,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 
 def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
-    """Write the states along a path as an animated GIF, all frames in the layout of the last state; return `path`."""
+    """Write the states along a path to `path` as an animated GIF.  All frames have the layout of the last state."""
     numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]

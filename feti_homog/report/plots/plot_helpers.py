@@ -87,9 +87,9 @@ PLAIN = Look()
 
 
 def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
-    """Write the figure in the format of `look`, by default without white margins; return the file path.
+    """Write the figure in the format of `look`; return the file path.
 
-    Raises FetiHomogError if the file cannot be written.
+    By default pictures have no white margins.  Raises FetiHomogError if the file cannot be written.
     """
     if look.title is not None:
         figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
@@ -105,21 +105,21 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
 
 @contextmanager
 def missing_letters_as_boxes() -> Iterator[None]:
-    """Context manager: silence warnings about letters that the font lacks; Matplotlib draws boxes instead."""
+    """Context manager: silence warnings about letters that the font lacks.  Matplotlib draws boxes instead."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
         yield
 
 
 def finish_curves(*panels: Axes) -> None:
-    """Add faint grids behind the curves of a figure, and a legend of the first panel below."""
+    """Add faint grids to the panels of a figure, and the first panel's legend below them."""
     for axes in panels:
         faint_grid(axes)
     legend_below(panels[0].figure, panels[0].get_legend_handles_labels()[0])
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
-    """Add a legend below the axes, in as many columns as fit into the figure, at most `limit`."""
+    """Add a legend below the axes.  It has as many columns as fit into the figure, at most `limit`."""
     for columns in range(min(len(handles), limit), 0, -1):
         legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
@@ -134,7 +134,7 @@ def faint_grid(axes: Axes) -> None:
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
-    """Draw triangles in smooth colours for nodal values (p,) at nodes `points` (p, 2); return the triangles."""
+    """Draw triangles in smooth colours by nodal values (p,) at `points` (p, 2).  Returns the triangles."""
     mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
@@ -214,9 +214,10 @@ def _outside(values: Array, bottom: float, top: float) -> str:
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
-    """Choose a displacement factor: 1, 2 or 5 times a power of ten, at most `largest`; 1 without displacement.
+    """Choose a displacement factor: 1, 2 or 5 times a power of ten.
 
-    The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
+    The factor is at most `largest`, and 1 without displacement.  The largest displacement is drawn as about a tenth of
+    the cell size, or up to a quarter to show a narrow opening.
     """
     if displacement == 0.0:
         return 1.0
@@ -242,7 +243,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress at the drawn nodes (p,): the mean over triangles that share the node and the body."""
+    """Return a stress at the drawn nodes (p,), a mean over the triangles of the same body at the node."""
     name, column = STRESS_TABLES[component]
     table = state[name]
     if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`
@@ -252,7 +253,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
 
 
 def bond_limits(case: Document) -> list[str]:
-    """Describe every interface law in one line, with its phases if the case has several laws."""
+    """Describe every interface law in one line.  With several laws, the lines begin with the phases."""
     bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
@@ -272,7 +273,7 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
 
 
 def plain(text: str) -> str:
-    """Escape control characters of a user's text, and dollar signs, which mark formulas of Matplotlib."""
+    """Escape control characters of a user's text, and dollar signs, which mark Matplotlib's formulas."""
     return escaped(text, "\n").replace("$", r"\$")
 
 
@@ -281,7 +282,7 @@ def unit_label(label: str) -> str:
 
 
 def stress_label(label: str) -> str:
-    """Return the stress unit for an axis; without a label in the case, the unit of the moduli."""
+    """Return the stress unit for an axis.  Without a `label` it is the unit of the moduli."""
     return unit_label(label) or "(unit of the moduli)"
 
 

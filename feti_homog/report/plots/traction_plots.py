@@ -30,7 +30,7 @@ NAMES = {
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw tractions, jumps and damage, one fibre per row: the most debonded or damaged, else the most loaded."""
+    """Draw tractions, jumps and damage of some fibres in rows: the most damaged, or else the most loaded fibre."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED

@@ -15,10 +15,10 @@ ROWS = 15  # of the table
 
 
 def path_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
+    """Return the table of a path, with totals above rows of points.
 
-    Columns: leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses;
-    a line names columns beyond the fifth, which only path.csv has.
+    The table has at most `limit` rows, by default `ROWS`.  Columns: leading and prescribed strains, named and acting
+    stresses, temperature, strains under prescribed stresses; a line names columns beyond the fifth, only in path.csv.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))

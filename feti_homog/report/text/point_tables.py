@@ -42,7 +42,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of stiffnesses or stresses and interface node counts at up to `limit` angles."""
+    """Return the table of stiffnesses or stresses and node counts at up to `limit` angles."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -88,7 +88,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Describe the debonded percentage of all interfaces, and of each phase pair if the case has several."""
+    """Describe the debonded percentage of the interfaces.  With several phase pairs, each has its own."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -139,14 +139,14 @@ def components(point: Point) -> tuple[float, float]:
 
 
 def tip_table(document: Document, tips: Document) -> Table:
-    """Return the table of the tip with the largest G for each load."""
+    """Return a table of tips: for each load, the tip with the largest energy release rate G."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
     return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return tables of the largest G for each angle and load, [] without tips; one load has all numbers of the tip."""
+    """Return tables of the largest G for each angle and load, or [].  A single load has all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

@@ -101,7 +101,7 @@ def short_summary(document: Document) -> str:
 
 
 def notebook(document: Document) -> str:
-    """Return the title, tables with at most 20 points, checks and status of a result as HTML."""
+    """Return the title, tables, checks and status of a result as HTML.  Tables have at most 20 points."""
     tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
@@ -210,7 +210,7 @@ def _number(count: int, name: str) -> str:
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return tables of stresses and utilisations in all states, or at some points on a curve; [] without stresses."""
+    """Return tables of stresses and utilisations of the phases; [] without stresses.  Curves show only some points."""
     phases = document.get("phase_stresses", ())
     if not phases:
         return []
@@ -259,6 +259,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value without noise, and its position in words, "-" for the value zero."""
+    """Return a value without noise, and its position in words.  The position is "-" for the value zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"
