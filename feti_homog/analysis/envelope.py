@@ -120,7 +120,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield the fields of `EnvelopePoint`, without angle, for each ray.  {} if no bond breaks.  Collective."""
+        """Yield the fields of `EnvelopePoint`, without angle, for each ray, or {} if no bond breaks.  Collective."""
         names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))

@@ -80,7 +80,7 @@ class CheckRecorder:
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
 
     def warnings(self) -> list[str]:
-        """Return a warning line if the solver tolerance is looser than the checks."""
+        """Return a warning line if the solver tolerance is looser than the checks, else []."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
         return [
@@ -162,7 +162,7 @@ class StateRecorder:
         return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:
-        """Return this rank's fields; None unless the run keeps fields in memory."""
+        """Return this rank's fields.  Returns None unless the run keeps fields in memory.  Collective."""
         if not self._keep:
             return None
         cell = self._cell

@@ -103,7 +103,7 @@ def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_point
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return [[interface]] section numbers, from 1, for indices `pair`.  None: the case has at most one section."""
+    """Return [[interface]] section numbers, from 1, for indices `pair`, or None in cases with at most one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 

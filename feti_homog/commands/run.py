@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Run the case file in the arguments.  Collective."""
+    """Run the case file in the arguments.  Collective.  Raises CaseError for `--resume` without a path."""
     from feti_homog.analysis import runner
     from feti_homog.results import output_folder
 

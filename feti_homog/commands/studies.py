@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """List the sweep cases, or run all cases or a single case.  Collective."""
+    """List the sweep cases, or run all cases or a single case.  Collective.  Raises CaseError if `--out` is missing."""
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     cases = mpi_errors.on_root(comm, sweep_cases.load, arguments.case)

@@ -40,7 +40,7 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 
 def require_tables(path: Path, state: int | None) -> None:
-    """Check result.h5 in this process; see `require_own`."""
+    """Check result.h5 in this process.  Raises like `require_own`."""
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
     try:
         with h5py.File(path, "r", locking=False) as file:
@@ -114,7 +114,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 
 
 def _require_mesh(path: Path, file: Any) -> None:
-    """Require elements with an area, fibres with elements, interface nodes in the mesh, and all phases in the case."""
+    """Check case, element areas, fibres, interface nodes, and names of phases and states.  Raises CaseError."""
     try:
         cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

@@ -215,7 +215,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
-    """Return the view of a symmetric tensor, with missing `entries` 0.  Order: 11, 12, 13, 21, 22, 23, 31, 32, 33."""
+    """Return the view of a symmetric tensor [11, 12, 13, 21, ..., 33].  Components without an entry are 0."""
     places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
     columns = {place: entries[entry] for place, entry in places if entry in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"

@@ -42,7 +42,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 def usable(directory: Path) -> None:
     """Check that a run can use the folder `directory`, and create nothing.
 
-    The folder, or the folder in which it will lie, must be writable, and no other run may use it.
+    The folder, or the folder in which it will lie, must be writable, and no other run may use it.  Raises CaseError.
     """
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):

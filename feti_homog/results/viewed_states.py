@@ -98,7 +98,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Read a state at the interface nodes.  Arrays: displacements of both faces, tractions, jumps, status, geometry."""
+    """Read a state at the interface nodes, with displacements of both faces, tractions, jumps, status and geometry."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)

@@ -217,7 +217,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Acquire the lock of a case, and keep it if the case must run.  On one rank.  Returns as `run` does."""
+        """Lock a case, and keep the lock if the case must run.  On one rank.  Returns and raises as `run` does."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)

@@ -100,7 +100,7 @@ class ParameterEstimates:
 
     @property
     def chance(self) -> float | None:
-        """The probability of such or larger residuals under a correct model.  None without degrees of freedom."""
+        """The probability of such or larger residuals under a correct model; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
@@ -179,7 +179,7 @@ def _sizes(x: Float) -> Float:
 def fit_document(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: int = 0
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name.  None stands for infinities and NaN; `teeth`: see `names_of`."""
+    """Return the content of fit.json without its name.  Infinities and NaN become None.  `teeth`: see `names_of`."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
     if misfits and estimates.undetermined:

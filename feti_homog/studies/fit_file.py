@@ -65,7 +65,7 @@ class FitReader:
     faults: list[str] = field(default_factory=list)
 
     def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
-        """Read the table of unknowns, and return the unknowns by key."""
+        """Read the table of unknowns, and return the sound unknowns by key.  Faults go to `faults`."""
         if not isinstance(table, dict) or not table:
             self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}

@@ -75,7 +75,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
 
 
 def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return the stiffnesses and constants of a result, with mesh errors and bounds."""
+    """Return stiffnesses, anisotropies and constants by column name, with mesh errors and bounds."""
     values = _linear(document, numbers)
     if (stiffness := document.get("effective_stiffness")) is not None:
         C = np.asarray(stiffness)

@@ -100,7 +100,7 @@ class SweepTable:
         return [document for document in self.documents if document is not None]
 
     def input_of(self, point: int, name: str) -> Any:
-        """Return the value of an input at a point.  None: the point does not set the input."""
+        """Return the value of an input at a point, or None if the point does not set the input."""
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:

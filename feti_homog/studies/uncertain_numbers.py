@@ -132,7 +132,7 @@ def _means(
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a path.  None: the value is no number, or the path fits several sections."""
+    """Return the number at a path, or None if there is no number or the path fits several sections."""
     result = _at(document, toml_files.in_lists(path))
     return float(result) if types.is_number(result) else None
 

@@ -191,7 +191,7 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """Return the section numbers (phases, phases) of pairs of phases.  -1: bonds never part."""
+    """Return the section numbers (phases, phases) of pairs of phases.  They are -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

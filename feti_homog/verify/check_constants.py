@@ -97,7 +97,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the bounds and the estimate of the effective conductivity by their formulas."""
+    """Check the closed forms of the conductivity, and that the conductivity is within Wiener's bounds."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
     limits = np.array([1 / (share @ (1 / across)), share @ across])

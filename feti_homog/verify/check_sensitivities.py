@@ -158,7 +158,7 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
 
 
 def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
-    """Return the table and key of a parameter, and its array index.  The index of a scalar is ()."""
+    """Return the table and key of a parameter, and its array index, () for a scalar."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):

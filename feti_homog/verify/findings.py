@@ -114,7 +114,7 @@ def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
 
 
 def solver_limit(rtol: float) -> float:
-    """Return min(1000 rtol, 1e-4).  Laws of the dual solver's accuracy have this limit."""
+    """Return min(1000 rtol, 1e-4), the limit of laws that hold to the solver's accuracy."""
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 

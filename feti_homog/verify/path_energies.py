@@ -161,7 +161,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
 
 
 def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
-    """Maximize t power - t^2 energy over t >= 0 with load = t unit.  -inf: no t fits, or the power is NaN."""
+    """Maximize t power - t^2 energy over t >= 0 with load = t unit.  Returns -inf if no t fits, or for NaN."""
     if not (load.any() or unit.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:

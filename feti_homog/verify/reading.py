@@ -170,7 +170,7 @@ class ResultFiles:
 
     @property
     def points(self) -> Points:
-        """Return the points of a path or of angles, or the single load.  [] for other analyses."""
+        """Return the points of a path or of angles, the single load, or [] for other analyses."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])

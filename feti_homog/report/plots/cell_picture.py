@@ -151,7 +151,7 @@ def _title(attributes: Any, text: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write the fibre numbers onto the drawn fibres, up to 2000 fibres.
+    """Write the fibre numbers onto the drawn fibres.  More than 2000 fibres get none.
 
     The cell sides may cut a round fibre; every part of the fibre then gets the number.
 

@@ -73,7 +73,7 @@ class Look:
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the style, with smaller text in a small picture."""
+        """Return Matplotlib's style parameters, with smaller text in a small picture."""
         width = 18.0 if self.size is None else self.size[0]
         return STYLE | {"font.size": max(10.0 * min(width / 18.0, 1.0), LEAST_TEXT)}
 

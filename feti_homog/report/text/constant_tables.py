@@ -131,7 +131,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of constants between bounds; without bounds, an empty table.  Marks: beyond Reuss or Voigt."""
+    """Return a table of constants between their bounds, or a title alone.  It marks values beyond Reuss and Voigt."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -252,7 +252,7 @@ def sensitivities(document: Document) -> list[Table]:
 
 
 def mesh_errors(document: Document) -> dict[str, float]:
-    """Return estimated mesh errors of constants, stiffness (C11, ...) and conductivity (k11, ...), by name."""
+    """Return estimated mesh errors by name: constants, C11, ..., k11, ..., and normal expansions."""
     numbers: Document = document.get("mesh_error") or {}
     tensors = {"C": numbers.get("effective_stiffness"), "k": numbers.get("effective_conductivity")}
     strains = dict(zip(voigt.EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
