@@ -27,7 +27,7 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Follow the path of the case with its bond law; see `follow`.  Collective."""
+    """Follow the path of the case, and return its `Result` entries as `follow` does.  Collective."""
     section = context.case.section
     assert isinstance(section, load_sections.LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))

@@ -251,7 +251,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove it.  Call on one rank.  So no run finds a partial folder.
+    """Rename the checkpoint folder, then remove it, so that no run finds a part of it.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.

@@ -139,10 +139,11 @@ def _is_own(path: Path) -> bool:
 
 
 def latest(directory: Path) -> dict[str, Any]:
-    """Return result.json, or a checkpoint of another case or with more points.  Call on one rank.
+    """Return the document of result.json or of the checkpoint.  Call on one rank.
 
-    For a checkpoint, the entry `unfinished` and the `status` give the number of points and the load.
-    Raises CaseError for a missing or damaged file, FetiHomogError for missing permissions.
+    The checkpoint counts if it has more points, or result.json is missing or of another case; then `unfinished` and
+    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, FetiHomogError for
+    missing permissions.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -227,7 +228,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove result files outside `written`, and the checkpoint if no log is written.  Call on one rank."""
+    """Remove result files that are not in `written`, and events if no log is written.  Call on one rank."""
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

@@ -166,7 +166,7 @@ class EventLog:
         self._stream: TextIO | None = None
 
     def write(self, line: str) -> None:
-        """Append a line to the log; nothing on other ranks and after `close`."""
+        """Append a line to the log.  Other ranks, and calls after `close`, write nothing."""
         if not self._wanted:
             return
         try:
@@ -182,7 +182,7 @@ class EventLog:
             self.close()
 
     def close(self) -> None:
-        """Close the log."""
+        """Close the log.  Later lines are ignored."""
         self._wanted = False
         if self._stream is not None:
             with contextlib.suppress(OSError):  # the stream has no unwritten line

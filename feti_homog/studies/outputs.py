@@ -219,7 +219,7 @@ OUTPUT_COLUMNS = (
 
 
 def named(word: str) -> list[str]:
-    """Describe entries of result.json and columns of cases.csv with a name.  `word` C11 stands for Cij."""
+    """Describe entries of result.json and columns of cases.csv named `word`.  C11 fits the column Cij."""
     entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
     lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
     for column in OUTPUT_COLUMNS:

@@ -63,7 +63,7 @@ class BondLaw(ABC):
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) absorbed by damage in modes psi (k,).  Damage (k,) rises from `before`."""
+        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:

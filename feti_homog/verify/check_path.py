@@ -17,7 +17,7 @@ from feti_homog.verify.reading import Status
 
 
 def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of breaks and the fracture energy of a path.  Bonds never heal.
+    """Check the breaks and the fracture energy of a path.  Bonds must never heal.
 
     A break adds the toughness times the broken length, at the mode in the state before the break; if the files lack
     this state, the energy must lie in its range over all modes.

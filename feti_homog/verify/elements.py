@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu, and the largest mu of any phase / mu, of mixed phases; 0 without these."""
+        """Return the largest lambda / mu and the largest (mu of any phase) / mu over mixed phases, or (0, 0)."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))

@@ -46,7 +46,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) absorbed by damage in modes psi (k,).  Damage (k,) rises from `before`."""
+        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:

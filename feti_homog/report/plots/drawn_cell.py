@@ -64,7 +64,7 @@ class InterfaceEdges:
         return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
 
     def state(self, status: Array) -> Array:
-        """Return the edge states (e,) for node states `status` (k,): of both ends, the later in STATE_NAMES."""
+        """Return edge states (e,) for node states `status` (k,): of the two ends, the state later in STATE_NAMES."""
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:

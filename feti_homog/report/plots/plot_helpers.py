@@ -243,7 +243,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress at the drawn nodes (p,), a mean over the triangles of the same body at the node."""
+    """Return a stress at the drawn nodes (p,), averaged over adjacent triangles of the same body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
     if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`

@@ -112,7 +112,7 @@ def loads(points: Sequence[Document]) -> Array:
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """Return the modes (n,) of breaks by psi or traction / strength: 0 opens, 90 degrees shear, NaN is no onset."""
+    """Return the modes psi (n,) of breaks in degrees: 0 opens, 90 shears.  They are NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (
