@@ -35,7 +35,7 @@ PICTURES = {
     "mesh_error": "Estimated error of the mesh",
     "sensitivities": "Relative changes of constants with each parameter",
 }
-MOST_ROWS = 60  # of a table of points
+MOST_ROWS = 60  # rows of a table of points
 # The policy lets the page fetch nothing, whatever the content.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
@@ -84,7 +84,7 @@ def page(document: Document, directory: Path) -> str:
     ]
     texts = dict[str, str]()
     for form in export.FORMATS:
-        with suppress(CaseError):  # of a result without a material, or one that the format cannot carry
+        with suppress(CaseError):  # the result has no material that the format can carry
             texts[f"Material card, {form}"] = export.card_of(document, form)
     texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
     *cards, case = (

@@ -119,7 +119,7 @@ def state_parts(
         if plane is not None and cell.axial is None:
             laws_of = [cell.case.material_of(s.submesh.phase) for s in cell.parts]
             rules = np.reshape([laws.out_of_plane(law, cell.case.analysis.plane)[0] for law in laws_of], (-1, 3))
-            rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # of elements
+            rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # a row for each element
             common["stress_33"] = np.einsum("ev,ev->e", common["stress"], rules)
             common |= _at_nodes(cell, response, in_plane)
             yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)

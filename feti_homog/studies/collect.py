@@ -18,7 +18,7 @@ from feti_homog.studies.predictions import responses
 from feti_homog.studies.sweep_table import PARTS, SweepTable
 
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
-MOST_ROWS = 40  # of the printed table
+MOST_ROWS = 40  # rows of the printed table
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 

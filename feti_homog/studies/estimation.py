@@ -18,7 +18,7 @@ from feti_homog.typing import Array, Float
 
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
-LEAST_CHANCE = 1e-3  # probability of equally large residuals, below which the model is refused
+LEAST_CHANCE = 1e-3  # probability of such or larger residuals, below which the model is refused
 # Directions with a smaller relative singular value are undetermined; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-5, 60  # the relative step that ends the search is far below 1 % differences and std
@@ -165,7 +165,7 @@ def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0
     `teeth` counts the teeth of a softening law, 0 for other laws.
     """
     reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
-    if teeth:  # of a softening law
+    if teeth:  # only softening laws have teeth
         reasons[True] = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a "
         reasons[True] += "staircase; more teeth (softening_tolerance) make it smooth"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]

@@ -14,7 +14,7 @@ from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
-MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # of the stresses in a phase
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # measures of phase stresses
 CONDUCTIVITIES = tuple(f"k{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 Column = result_json.DescribedColumn
 

@@ -36,7 +36,7 @@ class Evaluator:
     ranks_per_case: int
     retry: bool
     quiet: bool
-    warnings: list[str] = field(default_factory=list)  # about the first cases
+    warnings: list[str] = field(default_factory=list)  # warnings of the first cases
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.

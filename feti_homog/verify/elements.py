@@ -182,7 +182,7 @@ def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -
     """
     (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
-    bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients
+    bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients of the bubble
     square = np.einsum("eq,eqd,eqk->edk", weights, bubble, bubble)
     moment = np.einsum("eq,qm,eqd->emd", weights, places, bubble)
     matrix, right = np.zeros((len(weights), 5, 5)), np.zeros((len(weights), 5, 1))

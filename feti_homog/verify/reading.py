@@ -22,7 +22,7 @@ from feti_homog.verify.findings import Points, Section
 JSON, FIELDS, SCHEMA = "result.json", "result.h5", 1
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
 CHECKSUM_BLOCK = 1 << 26  # bytes
-COATING = "coating"  # phase
+COATING = "coating"  # name of the phase
 
 
 @dataclass(frozen=True)

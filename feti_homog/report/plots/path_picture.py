@@ -14,7 +14,7 @@ from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Array, Document
 
-MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # of landmarks
+MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # markers of landmarks
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 ROUND = (1, 2, 5, 10)  # steps of ticks
@@ -233,7 +233,7 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
             sums = [np.array(column[:-1]) + column[1:] for column in (values, [point["stored"] for point in points])]
             bend *= (sums[0] / np.maximum(sums[1], np.finfo(float).tiny))[:, None]
         between = values[:-1, None] + rise * steps - bend * steps * (1.0 - steps)
-        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # between distant points
+        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # points between distant loads
         return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
     values, load = values[rising], load[rising]
     start = np.append(0.0, load[:-1] / load[1:])

@@ -46,7 +46,7 @@ OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either
 INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 # Colours of macroscopic stresses: a component has the same colour in all pictures.
 STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
-ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # of the stiffness
+ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # colours of entries
 MESH = "0.4"  # colour of element sides
 NARROW = 5.0  # inches; panels of narrower pictures are stacked, and have short labels
 LEAST_TEXT = 7.5  # points; journals take no smaller text
@@ -246,7 +246,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     """Return a stress at the drawn nodes (p,), averaged over adjacent triangles of the same body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
-    if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`
+    if component == VON_MISES:  # by element means, as in `viewed_states`
         shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
         table = voigt.spatial_von_mises(state["stress"][:], table[:], shears)
     return node_means(triangle_means(table, column, drawn), drawn)

@@ -11,7 +11,7 @@ from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, wi
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Document
 
-ROWS = 15  # of the table
+ROWS = 15  # rows of the table, unless the caller limits them
 
 
 def path_table(document: Document, limit: int | None = None) -> Table:

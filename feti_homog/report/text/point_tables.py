@@ -13,7 +13,7 @@ from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, to
 from feti_homog.results import path_curves
 from feti_homog.typing import Document
 
-ENVELOPE_ROWS = 12  # of its table
+ENVELOPE_ROWS = 12  # rows of the envelope table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
@@ -29,7 +29,7 @@ ONSET = {
 }
 RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
          Column("angle", 9))  # fmt: skip
-SECTION = Column("interface", 11, "d")  # of cases that have several
+SECTION = Column("interface", 11, "d")  # for cases with several sections
 LAST_STRAIN = "bonded, open, closed: interface nodes under the unit strain gamma12"
 TIP_TITLE = "Largest energy release rate"
 

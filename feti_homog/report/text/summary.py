@@ -19,7 +19,7 @@ LABEL = 12  # characters of the labels at the left
 NAME = 28  # characters of the check names
 GLUE = "\N{NO-BREAK SPACE}"  # prevents a line break
 REMARKS = ("Remark", "Warning", "Fault")
-POINTS = 4  # of a curve, in tables of phase stresses
+POINTS = 4  # points of a curve in tables of phase stresses
 STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "hydrostatic"}
 
 
@@ -163,7 +163,7 @@ def _cell(document: Document) -> list[str]:
     mesh += [f"order {shape['order']}"] * ("order" in shape)
     if "refine" in shape:
         mesh.append(f"refine {shape['refine']}")
-    elif "accuracy" in shape:  # by which the program chose the mesh
+    elif "accuracy" in shape:  # the program chose the mesh by it
         chosen = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
         mesh.append(f"{chosen} for accuracy = {shape['accuracy']:g}")
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
@@ -250,7 +250,7 @@ def phase_tables(document: Document) -> list[Table]:
 def _states(document: Document, count: int) -> Sequence[int]:
     """Return the numbers of the states in the tables of phase stresses."""
     if "path" in document and "states" in document:
-        from feti_homog.results import landmarks  # of paths alone
+        from feti_homog.results import landmarks  # only paths have landmarks
 
         return landmarks.landmark_states(document, POINTS, count)
     points = len(document.get("angle", ())) or (count if "path" in document else 1)
