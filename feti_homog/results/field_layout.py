@@ -166,9 +166,10 @@ def rows_of(description: records.Description) -> str:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SpatialStatePart(StatePart):
-    """One state in generalized plane strain and this rank's part of its fields.
+    """One state in generalized plane strain or conduction, and this rank's part of its fields.
 
-    Fields are constant along x3, except for the displacement E33 x3.
+    Fields are constant along x3, except for the displacement E33 x3.  In conduction the displacement along x3 is the
+    temperature, and stresses 33, 23 and 13 are minus the flux.
     """
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.SPATIAL_STRAINS)}", shape="(6,)")
@@ -234,7 +235,7 @@ COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
-AXIAL = "axial_displacement"  # dataset that only states of generalized plane strain have
+AXIAL = "axial_displacement"  # dataset of states that are not plane
 
 # The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
@@ -242,7 +243,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     GROUP_OF_STATES: (_vector("displacement"), _tensor("stress", "stress", STRESS_TENSOR), *COLUMNS),
 }
 
-# The views of a state in generalized plane strain.
+# The views of a state in generalized plane strain or conduction.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
     _tensor(

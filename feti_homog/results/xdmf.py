@@ -41,7 +41,7 @@ INTERFACE_POINTS = {
     "normal": "vector/interface/normal",
     **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
 }
-# Further arrays in generalized plane strain.
+# Further arrays in generalized plane strain and conduction.
 SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in voigt.AXIAL_STRESSES}
 SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
 LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.values()}
@@ -103,7 +103,7 @@ def write(directory: Path) -> list[Path]:
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
     """Return load factor, mean strain and mean stress of a state as rows (1, c).
 
-    The means are vectors [11, 22, 12] or, in generalized plane strain, tensors; the temperature is then added.
+    The means are vectors [11, 22, 12] or, for states that are not plane, tensors; the temperature is then added.
     """
     names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
     if "temperature" in attributes:

@@ -1,8 +1,8 @@
 """Evaluate bond laws by independent formulas, and select the law at interface nodes.
 
 A law is a class, here or in `softening`, with the name that `case/bond_laws.py` lists.  Tractions (k, c) have a normal
-and a tangential component, and an axial one in generalized plane strain: t_n, t_t, t_a.  <t_i> is the magnitude of
-component i, but 0 for a normal compression; R_i is its strength, k_i its stiffness.
+and a tangential component, and for c = 3 an axial one: t_n, t_t, t_a.  <t_i> is the magnitude of component i, but 0 for
+a normal compression; R_i is its strength, k_i its stiffness.
 """
 
 from abc import ABC, abstractmethod

@@ -64,7 +64,7 @@ class DiscreteCell:
     """The mesh, the materials and the interface of a result.
 
     Attributes:
-        stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain.
+        stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain and conduction.
         expansions: (phases, v) strain per temperature, 0 if unknown.
         constituent: (subdomains,) number of the connected part of a phase to which a subdomain belongs.
         inner: (s,) whether a torn side is the inner face of bonds that may break.

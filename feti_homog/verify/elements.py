@@ -1,8 +1,8 @@
 """Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
 
-Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
-orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a = r_a, or
-r_a (2 r_a - 1) and 4 r_a r_b in isoparametric elements.
+Displacements have c = 2 components, or 3 in generalized plane strain and conduction; strains and stresses have v = 3 or
+6, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a =
+r_a, or r_a (2 r_a - 1) and 4 r_a r_b in isoparametric elements.
 """
 
 from collections.abc import Iterator

@@ -111,7 +111,7 @@ class State:
 
     @property
     def along(self) -> float:
-        """Return E33; 0 except in generalized plane strain."""
+        """Return E33 in generalized plane strain, the gradient along x3 in conduction, and 0 in plane states."""
         return float(self.strain[2]) if len(self.strain) > 3 else 0.0
 
 

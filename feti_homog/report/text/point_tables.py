@@ -1,4 +1,4 @@
-"""Build the tables of an angle, a load or an envelope, and of energy release rates at tips."""
+"""Build the tables of an angle, a load or an envelope, and of energy release rates G at tips."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -42,7 +42,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of stiffnesses or stresses and node counts at up to `limit` angles."""
+    """Return the table of stiffnesses or stresses at up to `limit` angles.  Narrow tables also have node counts."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
