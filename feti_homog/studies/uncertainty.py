@@ -35,7 +35,7 @@ Documents = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class ScatterStudy(Study):
-    """A study of the scatter that the uncertain numbers of a case cause."""
+    """A study of the scatter that the uncertain numbers of a case cause.  `means` has their values by dotted key."""
 
     KIND, FILE = "study of scatter", "uncertainty.json"
     ENTRIES = re.compile(r"uncertainty\.json|means|differences")
