@@ -68,8 +68,8 @@ def _cost_lines(
 ) -> Iterator[str]:
     """Yield lines about the solver, ranks and memory.  A path adds the memory for complete debonding.
 
-    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError as
-    `solver_plan.choose`, or if a case with friction has no influence columns.
+    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError
+    like `solver_plan.choose`, or if a case with friction has no influence columns.
     """
     problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across

@@ -215,7 +215,7 @@ class Result:
 
         With s = sqrt(toughness / toughness in the case), loads times s and every toughness times s^2 lead to the same
         events, with strains and stresses times s and energies times s^2.  This holds if bonds break by energy on
-        springs of fixed stiffness, for such springs break at tractions proportional to s, and the response of a cell
+        springs of fixed stiffness: such springs break at tractions proportional to s, and the response of a cell
         with contact has degree one in the loads.  The result has no fields, states or digest, which only a run makes.
         Raises ValueError for any other result, and for a toughness that is not positive.
         """

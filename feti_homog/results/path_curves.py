@@ -23,7 +23,7 @@ Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """Return the waypoints, or the single load, of the case, each with all components by name."""
+    """Return the case's waypoints, or its single load, with all components by name."""
     return load_sections.completed(_given(document), document["case"]["analysis"]["plane"])
 
 

@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises as `write` for values."""
+    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write` for values."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -109,7 +109,7 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the CSV columns for records of a class, for the reference manual."""
+    """Yield the CSV columns for records of a class, with units and meanings."""
     for name, description in _in_columns(kind).items():
         # The components in the plane are among the spatial components, in the same order.
         for component in description.spatial_components or description.components or (name,):

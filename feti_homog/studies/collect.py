@@ -30,7 +30,7 @@ def read(directory: Path) -> SweepTable:
 def collect(directory: Path, pictures: bool) -> list[str]:
     """Write the tables and the picture of a sweep to its folder.  On one rank.
 
-    Returns the lines to print.  Raises CaseError as `read`, and FetiHomogError if a file cannot be written.
+    Returns the lines to print.  Raises CaseError like `read`, and FetiHomogError if a file cannot be written.
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)

@@ -236,7 +236,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    """Read result.json.  Raises CaseError if it is damaged or has another schema, and as `input_files.unreadable`."""
+    """Read result.json.  Raises CaseError if it is damaged or has another schema, and like `input_files.unreadable`."""
     try:
         document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:

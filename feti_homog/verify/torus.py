@@ -87,7 +87,7 @@ def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornN
 
 
 def wrapped(points: Float, shift: Float | None) -> Float:
-    """Shift points (k, 2) by periods to coordinates in [0, shift)."""
+    """Shift points (k, 2) by periods to coordinates in [0, shift).  Without a shift they stay."""
     if shift is None:
         return points
     inside = points - np.floor(points / shift) * shift
