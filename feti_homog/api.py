@@ -214,8 +214,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 @contextlib.contextmanager
 def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
-    """Context manager: start PETSc unless it runs.  Yields the communicator to one thread at a time; raises like `run`.
-    """
+    """Context manager: start PETSc unless it runs; yield the communicator to one thread.  Raises like `run`."""
     standard_streams.prepare()
     process.prefer_own_toolkits()
     libraries.require()
