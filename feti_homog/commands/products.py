@@ -62,7 +62,7 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print or write a table of the fibres of a case, result or image; with `--out` draw an image's.  Collective."""
+    """Print or write the fibre table of a case, result or image; `--out` adds a picture of the image.  Collective."""
     from feti_homog.commands import listed_fibres, micrograph
 
     if arguments.image is None:

@@ -82,7 +82,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     """Compute matrices (phases, 2, 3) from [S11, S22, S12] to [S33, E33].
 
     E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with compliances s and stresses S' in material axes; S33 or E33 is 0.
-    The matrix is NaN if the constants do not determine S33 or E33.  Raises like `laws`.
+    The row of the other is NaN if the constants do not determine it.  Raises like `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],
