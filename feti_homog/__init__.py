@@ -54,7 +54,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name on first access, so that `feti-homog` starts at once and `verify` loads no analysis."""
+    """Import a public name on first access, so that start-up is fast.  Raises AttributeError for other names."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{HOMES.get(name, 'api')}"), name)

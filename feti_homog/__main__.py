@@ -9,7 +9,7 @@ from feti_homog.system.runtime import process, standard_streams
 
 
 def main() -> int:
-    """Run the command line in a prepared environment; returns the exit code."""
+    """Run the command line in a prepared environment, and return the exit code."""
     process.prepare_environment(os.environ)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback

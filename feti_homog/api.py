@@ -47,11 +47,11 @@ def run(
         quiet: print nothing; otherwise print as the command line does.
 
     Raises:
-        TypeError: `case` is not a Case.
+        TypeError: `case` is not a Case, or `comm` is not an intracommunicator.
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; the computed part is in `out`.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
-        FetiHomogError: MPI has ended, or another thread of the process is in a call of this module.
+        FetiHomogError: a file cannot be written, MPI has ended, or another thread is in a call of this module.
     """
     if not isinstance(case, Case):
         raise TypeError(f"run takes a Case, not {type(case).__name__}: Case.load reads a file, Case.parse a document")
@@ -95,9 +95,9 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and the sweep picture.  Collective.
+    """Write cases.csv, statistics.csv and the sweep picture; return the lines to print.  Collective.
 
-    The sweep may still be running.  Returns lines to print.  Raises CaseError if `out` is not a sweep folder.
+    The sweep may still be running.  Raises CaseError if `out` is not a sweep folder.
     """
     with _started(comm) as comm:
         from feti_homog.studies import collect
@@ -151,8 +151,8 @@ def launch(
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
     """Start PETSc and run a command on all ranks.
 
-    PETSc takes its options from `argv` (default: the arguments of the process), the command the other words.  Returns
-    the exit code of `run_main`.
+    PETSc takes its options from `argv` (default: of the process), the command gets the other words.  Returns the exit
+    code of `run_main`, or the code for missing libraries.
     """
     words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
@@ -199,7 +199,7 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """Parse arguments on all ranks; rank 0 alone prints help, version and errors.  Collective."""
+    """Parse arguments on all ranks; rank 0 alone prints.  Raises SystemExit as argparse does.  Collective."""
     printed = io.StringIO()
     try:
         with contextlib.ExitStack() as redirected:
@@ -214,7 +214,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 @contextlib.contextmanager
 def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
-    """Start PETSc unless it runs, and yield the communicator, by default of all ranks, to one thread at a time."""
+    """Context manager: start PETSc unless it runs; yield the communicator to one thread.  Raises like `run`."""
     standard_streams.prepare()
     process.prefer_own_toolkits()
     libraries.require()

@@ -19,7 +19,7 @@ class ExitCode(IntEnum):
 
 
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape unprintable characters except `allowed`, since a terminal would obey control characters of a file."""
+    """Escape unprintable characters except `allowed`.  A terminal would obey control characters of a file."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
@@ -46,19 +46,19 @@ class FetiHomogError(Exception):
 
 
 class CaseError(FetiHomogError):
-    """The case file or the command line is faulty; each fault names section and key."""
+    """The case file or the command line is faulty.  Each fault names section and key."""
 
     exit_code = ExitCode.INPUT
 
 
 class MeshError(FetiHomogError):
-    """The cell cannot be meshed, or a user's mesh is faulty; each fault names nodes or elements."""
+    """The cell cannot be meshed, or a user's mesh is faulty.  Each fault names nodes or elements."""
 
     exit_code = ExitCode.INPUT
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge or a check failed; the computed part is written as `not converged`."""
+    """A solve did not converge or a check failed.  The computed part is written as `not converged`."""
 
     exit_code = ExitCode.UNCONVERGED
 
@@ -72,6 +72,6 @@ class NoMemoryError(FetiHomogError):
 
 
 class LibraryError(FetiHomogError):
-    """A library that pip does not install is missing or does not fit; each fault gives the remedy."""
+    """A library that pip does not install is missing or does not fit.  Each fault gives the remedy."""
 
     exit_code = ExitCode.INPUT

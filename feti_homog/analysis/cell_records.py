@@ -89,7 +89,7 @@ class FibreInfo:
 
 
 def _listed(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
-    """Return the centres (fibres, 2) in the user's coordinates, and the rows of the fibre table."""
+    """Return fibre centres (fibres, 2) in the user's coordinates, and table rows, None without a table."""
     summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
     centres = summary.centres[summary.fibre_bodies] + summary.origin
     if table is None:

@@ -13,10 +13,12 @@ from feti_homog.typing import Float
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entry `effective_conductivity`, with closed forms and mesh errors.  Collective.
+    """Return the `Result` entries of a conductivity.  Collective.
 
-    The problem div q = 0, q = -k grad T, grad T = G + grad T* is axial shear with k as shear moduli.  A gradient along
-    the fibres has T* = 0 unless a phase has k13 or k23.  Column j of the result is -<q> under the unit gradient j.
+    These are `effective_conductivity`, closed forms and, on request, sensitivities and mesh errors.  The flux q and the
+    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*:
+    axial shear with k as shear moduli.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.  Column j
+    of the result is -<q> under the unit gradient j.
     """
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     k = columns["stiffness"]
@@ -40,9 +42,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
-    """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.
+    """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.  Collective.
 
-    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).  Collective.
+    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
@@ -66,7 +68,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
 def _note_bounds(
     context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
 ) -> None:
-    """Note conductivities across the fibres that lie outside their bounds, with `constants.note_outside`."""
+    """Note conductivities across the fibres outside their bounds; see `constants.note_outside`."""
     least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
     error = np.asarray(errors[:2, :2].max())
     limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener

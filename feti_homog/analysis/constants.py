@@ -31,8 +31,8 @@ OFF = 3.0  # largest ratio of the true energy error to the estimate
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    The result is empty for a plane cell with interfaces, and if faces touch without tension, because each stiffness
-    column is then a secant under a different load.
+    Returns {} for a plane cell with interfaces, and if faces touch without tension, since each stiffness column is then
+    a secant under a different load.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -54,7 +54,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
     """Compute the constants of a stiffness, as `Result` entries.
 
-    The stiffness is (3, 3) or (6, 6), the thermal stress (6,).
+    The stiffness is (3, 3) or (6, 6), the thermal stress (6,) or None.
     """
     if len(stiffness) == 3:
         return {"moduli": engineering_constants.engineering_moduli(stiffness)}
@@ -100,7 +100,11 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 
 
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
-    """Return a radius for each fibre phase; None if closed forms do not apply (springs need equal radii)."""
+    """Return a radius for each fibre phase, or None if closed forms do not apply.
+
+    Closed forms need round fibres without coatings, the same bonds for all phases and, with springs, equal radii in a
+    phase.
+    """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
     is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)
@@ -137,10 +141,10 @@ def mesh_error(
     of_plus: list[mesh_estimate.EnergyErrors],
     of_minus: list[mesh_estimate.EnergyErrors],
 ) -> dict[str, Any]:
-    """Return the `Result` entry `mesh_error`, or nothing without estimated errors.  Collective.
+    """Return the `Result` entry `mesh_error`; {} without estimated errors.  Collective.
 
-    The error of a constant f(C) is max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes an energy error above
-    the accuracy of the case, and constants outside their bounds.
+    A constant f(C) of the stiffness C has the error max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|) with the parts
+    of `EnergyErrors`.  Notes an energy error above the accuracy of the case, and constants outside their bounds.
 
     Args:
         secants: `effective_stiffness` and the entries that follow from it, as in `Result`.
@@ -167,7 +171,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would suffice if the energy error exceeds `accuracy`.  Collective."""
+    """Note which mesh would suffice if the energy error exceeds the case's `accuracy`, if any.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
@@ -204,7 +208,7 @@ def note_outside(
 ) -> None:
     """Note each value outside its limits; record a fault if no mesh error explains the excess.
 
-    The limits bound effective constants; constants of a cell that is not periodic may lie outside.
+    The limits bound constants of periodic cells; the function skips cells with other boundaries.
     """
     if context.case.cell.boundary != "periodic":
         return
@@ -243,7 +247,7 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note if the mesh error under the first load exceeds `accuracy`.  Collective."""
+    """Note a mesh error above `accuracy` under the first load that is not zero.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))
@@ -256,12 +260,12 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return the entry `mesh_error`: largest relative error of strain energy under any strain; {} without errors."""
+    """Return the entry `mesh_error`, the largest relative energy error under any strain; {} without errors."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return the errors of `effective_stiffness` and `thermal_stress`, for one part `name` of PARTS."""
+    """Return one part `name` (of PARTS) of the errors of stiffness and thermal stress; {} without errors."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -269,7 +273,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return the constants of a stiffness by name, with `thermal_expansion`."""
+    """Return the constants of a stiffness by name.  Of (6, 6) they include nu31, nu32 and, with heat, expansions."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}
@@ -283,7 +287,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
     """Return the largest relative strain energy error under any strain.
 
-    If the stiffness is not positive definite, return the largest error under a unit strain.
+    If the stiffness is not positive definite, return the largest relative error under a unit strain.
     """
     symmetric = (stiffness + stiffness.T) / 2
     if np.linalg.eigvalsh(symmetric)[0] <= 0:

@@ -29,7 +29,8 @@ class CellLoads:
     """The loads of a cell, and averages over the cell under each load.
 
     Attributes:
-        problems: the plane problem, in which faces may touch; in generalized plane strain also the axial problem.
+        problems: the plane problem, in which faces may touch, with the axial problem in generalized plane strain; or
+            conduction.
         interfaces: the interfaces, coupled in all problems.
         names: names of the unit loads of all problems.
     """
@@ -42,7 +43,7 @@ class CellLoads:
         self.names = tuple(name for problem in self.problems for name in problem.loads)
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """Return the load of a waypoint, a mapping of strains and stresses."""
+        """Return the load of a waypoint, which maps names of strains and stresses to values.  Other stresses are 0."""
         stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
@@ -71,7 +72,7 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the largest ratio of strains to strains of the bonded cell.  Collective."""
+        """Return the largest ratio of a strain to the strain of the bonded cell.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
@@ -135,12 +136,12 @@ class AnalysisContext:
 
     @property
     def plane(self) -> averaging.Homogenization:
-        """Return the plane problem."""
+        """Return the first problem: the plane problem, or conduction."""
         return self.loads.problems[0]
 
     @property
     def cell(self) -> unit_cell.TornCell:
-        """Return the torn cell of the plane problem."""
+        """Return the torn cell of the first problem."""
         return self.plane.cell
 
     @property
@@ -150,11 +151,11 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, so that keeping factors pays off."""
+        """Return whether the run recovers interior displacements repeatedly, which makes factors worth their memory."""
         return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
-        """Return the initial bond state, with the prescribed debonded nodes open."""
+        """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
 
     def unit_responses(
@@ -205,7 +206,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return a path point's entries: debonding under the last plane strain, and iterations.  Collective."""
+        """Return the entries of a point: debonding under the last plane response, and iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -218,7 +219,10 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the means, energies and debonding of a point under one load.  Collective."""
+        """Return the means, energies and debonding of a point under one load.  Collective.
+
+        Also adds the undetermined strains of the point to `undetermined`, and updates `excess`.
+        """
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
@@ -229,7 +233,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """Return the notes, and remarks on undetermined and absurd strains."""
+        """Return the notes, and remarks on singular stresses, undetermined strains and absurd strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses of the phases: beside {' and '.join(places)} they rise with finer elements")

@@ -17,9 +17,9 @@ from feti_homog.system.petsc import options_database
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """Describe a run of the case on these ranks, under its own options; empty except on rank 0.  Collective.
+    """Describe a run of the case on these ranks, under its own options.  Collective.
 
-    Raises like `tear`.
+    The text is empty except on rank 0.  Raises CaseError and MeshError as `unit_cell.tear` does.
     """
     with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -66,12 +66,10 @@ def _cost_lines(
     subdomains: Sequence[int],
     nodes: Sequence[int],
 ) -> Iterator[str]:
-    """Yield lines about the solver, ranks and memory; for a path, also up to complete debonding.
+    """Yield lines about the solver, ranks and memory.  A path adds the memory for complete debonding.
 
-    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.
-
-    Raises:
-        CaseError: as in `solver_plan.choose`, or if a case with friction has no influence columns.
+    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError
+    like `solver_plan.choose`, or if a case with friction has no influence columns.
     """
     problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across

@@ -47,9 +47,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
 
     `envelope` lists directions with the load at which the first bond breaks; all other entries follow from unit loads.
-
-    Raises:
-        CaseError: faces in the mesh are debonded and may touch.
+    Raises CaseError if faces in the mesh are debonded and may touch.
     """
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)
@@ -79,8 +77,8 @@ def rays_of(
 ) -> Rays:
     """Return the rays at angles (n,), in degrees, from the first axis.
 
-    `plane` names both axes.  Stress rays have E = C^-1 S and begin at zero stress after the temperature change;
-    strain rays begin at zero strain.
+    `plane` names both axes.  With the stiffness C, stress rays have the strains E = C^-1 S for the stresses S, and
+    begin at zero stress after the temperature change; strain rays begin at zero strain.
     """
     strains, stresses = voigt.voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
@@ -122,7 +120,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield the fields of `EnvelopePoint` for each ray, without the angle.  Collective."""
+        """Yield the fields of `EnvelopePoint`, without angle, for each ray, or {} if no bond breaks.  Collective."""
         names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
@@ -166,8 +164,8 @@ class _Finder:
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
         """Return the first break on each ray as a row.  Collective.
 
-        A row has the least factor; fibre, interface and direction of the bond; and the law's numbers for the break.
-        Ties: lowest fibre, then interface, then direction.
+        A row has the least factor, inf without a break; fibre, interface and direction of the bond; and the law's
+        numbers for the break.  Ties: lowest fibre, then interface, then direction.
 
         Args:
             factors: (n, k) factors at which each bond breaks.

@@ -27,7 +27,7 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Follow the path of the case with its bond law; see `follow`.  Collective."""
+    """Follow the path of the case, and return its `Result` entries as `follow` does.  Collective."""
     section = context.case.section
     assert isinstance(section, load_sections.LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))
@@ -36,8 +36,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
     """Follow a path and return its `Result` entries.  Collective.
 
-    The entry `path` has a point for each event or increment; `states` has the numbers of points with fields.  Each
-    point is written to the checkpoint at once.
+    `path` has a point for each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and
+    `resumed` the number of points from the checkpoint.  Each new converged point is written to the checkpoint at once.
     """
     check_accuracy(context)
     count = min(path_events.resumable(context), path.max_events)
@@ -97,9 +97,7 @@ def _points(
 
     Points come first from the checkpoint, with the numbers that `path_events.restored` adds, then from the load path.
     The path ends with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
-
-    Raises:
-        NotCarriedError: the cell does not carry the stresses of the first point.
+    Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))
@@ -138,10 +136,7 @@ def _points(
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Add a remedy to the error that ends a path.
-
-    `place` names the position on the path; it is empty before the first point.
-    """
+    """Return the error that ends a path, with a remedy.  Before the first point `place` is empty."""
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
         return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -193,10 +188,10 @@ def _completed(
     bonds: Sequence[tuple[float, float]],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Complete the entries of a finished path.  Collective.
+    """Return the `Result` entries `path`, `peak` and `states` of a finished path.  Collective.
 
-    The function marks the main points, names the most utilised of the `bonds` at the landmarks, and records tips and
-    fields at the kept points.  The checkpoint provides all kept points but the last.
+    The function marks the landmarks, names the most utilised of the `bonds` there, and records tips and fields at the
+    kept points.  The checkpoint provides all kept points except the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()
@@ -241,7 +236,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a path point by products F lambda, and check the responses.  Collective."""
+    """Complete a path point by products with the dual operator, and check its responses.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

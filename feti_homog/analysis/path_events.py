@@ -66,8 +66,8 @@ def stored(
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
     """Split a point into plain numbers and distributed arrays for the checkpoint.
 
-    A resumed path continues from the multipliers of the last state.  The `bond` is as in `most_utilised_bond`; `entry`
-    is the point's entry in result.json.
+    A resumed path continues from the multipliers of the last state.  `bond` comes from
+    `tip_records.most_utilised_bond`; `entry` is the point's entry in result.json.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -108,8 +108,9 @@ def stored(
 def restored(
     event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
 ) -> tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]]]:
-    """Rebuild a path point, the energies up to this point, and its most utilised bond from an event.
+    """Rebuild a path point from an event.
 
+    Returns the point, and a triple: energies up to this point, `Work.load_controlled`, and the most utilised bond.
     Arrays for which the checkpoint had no room are empty; `found_again` computes them.
     """
     states = list[Equilibrium]()
@@ -148,7 +149,7 @@ def restored(
 
 
 def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:
-    """Restore the responses of an event.  Collective."""
+    """Restore the responses at a point from its event.  Collective."""
     responses = list[averaging.Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
@@ -161,7 +162,7 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
 
 
 def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces) -> path_points.Point:
-    """Solve for the equilibrium of a point whose event has no multipliers.  Collective."""
+    """Return a point with its equilibrium solved again, for an event without multipliers.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -179,10 +180,8 @@ def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, pat
 def resumable(context: AnalysisContext) -> int:
     """Count the checkpoint events that a run can reuse.  Collective.
 
-    A run that does not resume drops all events; a resumed run reuses the events before the first invalid event.
-
-    Raises:
-        CaseError: the checkpoint cannot be used.
+    A run that does not resume drops all events and returns 0; a resumed run reuses the events before the first invalid
+    event.  Raises CaseError if the checkpoint cannot be used.
     """
     say = context.progress.say
     if not context.resume:
@@ -197,7 +196,7 @@ def resumable(context: AnalysisContext) -> int:
 
 
 def consistent(context: AnalysisContext, count: int) -> int:
-    """Count leading events whose arrays, bonds, loads and sums fit a path.  Collective."""
+    """Count the leading events with arrays, bonds, loads and energies that fit the path.  Collective."""
     cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
     waypoints = [context.loads.load(target) for target in context.case.targets]
     waypoints, legs = [Load(0.0 * waypoints[0].values, waypoints[0].by_stress), *waypoints], len(waypoints)
@@ -227,8 +226,8 @@ def consistent(context: AnalysisContext, count: int) -> int:
 def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective.
 
-    Completes and checks the last events, back to the point at which F lambda has confirmed every problem.  Events are
-    invalid from the first failed check or wrong mean on.
+    Completes and checks the last events, back to the point at which products F lambda with the dual operator F have
+    confirmed every problem.  Events are invalid from the first failed check or wrong mean on.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:
@@ -269,7 +268,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
-    """Count this rank's bonds that part; -1 for wrong arrays, impossible numbers, or bonds that heal."""
+    """Count this rank's bonds that part.  Returns -1 for wrong arrays, impossible numbers, or bonds that heal."""
     kept = {name: of for name, of in layout.items() if "lam" in event or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != kept:
         return -1

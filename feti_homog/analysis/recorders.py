@@ -43,7 +43,7 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: averaging.Response) -> str:
-        """Record the checks of a response and return a line about it.
+        """Record the checks of a response and return a line about the response.
 
         A solve without convergence and a failed check are faults.
         """
@@ -80,7 +80,7 @@ class CheckRecorder:
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
 
     def warnings(self) -> list[str]:
-        """Return a warning line if the solver tolerance is looser than the checks."""
+        """Return a warning line if the solver tolerance is looser than the checks, else []."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
         return [
@@ -90,7 +90,7 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """A recorder of states: fields in a file, in memory or nowhere, and the largest phase stresses.
+    """A recorder of states and of the largest phase stresses.  Fields go to a file, to memory or nowhere.
 
     Attributes:
         has_place: whether fields are recorded.
@@ -112,7 +112,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record labelled states; a state has a response, or None, for each problem.  Collective."""
+        """Record labelled states.  A state has a response, or None, for each problem.  Collective."""
         if not self.is_recording:
             return
         fields = recovered_fields.recover(self._cell, [*states.values()])
@@ -129,12 +129,12 @@ class StateRecorder:
                 self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
-        """Complete the file and return its seal; None without a file.  Collective."""
+        """Complete the file and return its seal.  Returns None without a file or after a write error.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[..., object], *arguments: object) -> None:
-        """Write to the file, if any; after an error, continue without the file."""
+        """Write to the file, if any.  After an error, continue without the file."""
         if self._file is not None:
             try:
                 write(self._file, *arguments)
@@ -143,7 +143,7 @@ class StateRecorder:
                 self._say(f"warning: {error}; the remaining results are computed without it")
 
     def phase_stresses(self) -> tuple[PhaseStresses, ...] | None:
-        """Return the largest stresses of each phase in all states; None without recorded stresses."""
+        """Return the largest stresses of each phase in all states.  Returns None without recorded stresses."""
         phases = dict.fromkeys(phase for state in self._largest for phase in state)
         return tuple(map(self._of_phase, phases)) or None
 
@@ -162,7 +162,7 @@ class StateRecorder:
         return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:
-        """Return this rank's fields; None unless the run keeps fields in memory."""
+        """Return this rank's fields.  Returns None unless the run keeps fields in memory.  Collective."""
         if not self._keep:
             return None
         cell = self._cell

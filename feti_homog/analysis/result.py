@@ -54,7 +54,7 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Join the parts of all ranks on rank 0; return None on other ranks.  Collective."""
+        """Join the parts of all ranks on rank 0.  Returns None on other ranks.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -66,7 +66,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Gather the rows of a part on rank 0, in rank order; return None on other ranks.  Collective."""
+    """Gather the rows of a part on rank 0, in rank order.  Returns None on other ranks.  Collective."""
     parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
     if comm.rank:
         return None
@@ -215,7 +215,7 @@ class Result:
 
         With s = sqrt(toughness / toughness in the case), loads times s and every toughness times s^2 lead to the same
         events, with strains and stresses times s and energies times s^2.  This holds if bonds break by energy on
-        springs of fixed stiffness, for such springs break at tractions proportional to s, and the response of a cell
+        springs of fixed stiffness: such springs break at tractions proportional to s, and the response of a cell
         with contact has degree one in the loads.  The result has no fields, states or digest, which only a run makes.
         Raises ValueError for any other result, and for a toughness that is not positive.
         """
@@ -232,7 +232,7 @@ class Result:
         return replace(Result.of(document), states=None, result_h5=None)
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number by its name in a record of CONSTANTS, such as E1, nu12, G12 or E_axial.
+        """Return a number by its name in a record of CONSTANTS, such as E1.
 
         Raises AttributeError, which names the record with this attribute, or similar names.
         """
@@ -263,7 +263,7 @@ RECORDS = (*filter(is_dataclass, (*vars(cell_records).values(), *vars(result_rec
 
 
 def _times(value: Any, s: float, power: int = 0) -> Any:
-    """Multiply the numbers in a value by s^k, with the power k of their entry in POWERS."""
+    """Multiply the numbers in a value by s^k.  POWERS has the power k of an entry."""
     if isinstance(value, Mapping):
         return {name: _times(item, s, POWERS.get(name, power)) for name, item in value.items()}
     if isinstance(value, list | tuple):

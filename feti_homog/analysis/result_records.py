@@ -191,7 +191,7 @@ class PathPoint:
 class Peak:
     """The largest stress on a path before the deepest fall of the stress.
 
-    The stress component is conjugate to the largest strain that changes up to the end of the leg with the first break.
+    The component is conjugate to the largest changing strain up to the end of the leg with the first damage.
     """
 
     stress_name: str = described("name of the component")
@@ -252,7 +252,7 @@ class LoadPoint:
 class EnvelopePoint:
     """The debonding onset along one direction in a plane of stresses or strains.
 
-    All fields but `angle` are missing if no load in this direction breaks a bond.
+    If no load in this direction breaks a bond, only `angle` has a value.
     """
 
     angle: float = described("direction of the load in the plane, from the first axis to the second", records.DEGREES)

@@ -41,6 +41,7 @@ def run(
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint or a folder in use.
         ConvergenceError: after the result has been written and marked.
+        FetiHomogError: a file cannot be written.
     """
     comm = progress.comm
     if resume:
@@ -80,7 +81,10 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) -> Iterator[unit_cell.TornCell]:
-    """Tear the cell while the PETSc options of the case are set.  Collective."""
+    """Context manager: tear the cell while the PETSc options of the case are set.  Collective.
+
+    Turns LinAlgError, from matrices singular by rounding, into ConvergenceError.
+    """
     PETSc.garbage_cleanup(comm)  # all ranks free the parallel objects of earlier cases together
     process.forget_peak(kept=SPARE_BYTES)
     for warning in case.warnings():  # while there is time to stop the run; the summary has the remarks
@@ -103,7 +107,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) 
 def _run_and_write(
     cell: unit_cell.TornCell, directory: Path, progress: standard_streams.Progress, resume: bool, keep_fields: bool
 ) -> Result:
-    """Analyse a torn cell, write the files, and return the result.  Collective."""
+    """Analyse a torn cell, write the files, and return the result.  Collective.  Raises FetiHomogError."""
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:

@@ -54,8 +54,9 @@ def sensitivities(
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[averaging.Response]) -> dict[str, Any]:
     """Return the `Result` entry `sensitivities` of the state under one load.  Collective.
 
-    The faces stay fixed as in the state.  With the cell stiffness A for these faces, A x = s; the load prescribes x or
-    s in each component.  The free strains follow from A dx = -dA x; the stored energy changes by d(x.s / 2).
+    The faces stay fixed as in the state.  With macroscopic strains x, stresses s and the cell stiffness A for these
+    faces, A x = s; the load prescribes x or s in each component.  The free strains follow from A dx = -dA x; the stored
+    energy changes by d(x.s / 2).
     """
     fixed = _at_status(context, "load", responses, range(len(context.loads.problems)))
     A = block_diag(*(np.stack([r.stress for r in group], axis=1) for group in fixed))
@@ -82,7 +83,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Build the `Result` entry `sensitivities` from values and their derivatives with respect to each parameter."""
+    """Build the entry `sensitivities` from values, and from their derivatives (`columns`) by parameter."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),

@@ -16,7 +16,7 @@ SECONDS_A_LINE = 60.0
 def shown(
     progress: standard_streams.Progress, label: str, clock: Callable[[], float] = time.monotonic
 ) -> Iterator[Callable[[float, int, str, bool], object]]:
-    """Show the finished share of a computation, the rate of steps, and the time used and left.
+    """Context manager: show the finished share of a computation, the rate of steps, and times.
 
     The block calls `advance(share, count, text, known)` after each step; `known` steps were not computed here.  The
     time left assumes that the share keeps growing at its mean rate since the last known step.

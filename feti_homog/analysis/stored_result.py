@@ -14,7 +14,7 @@ from feti_homog.schema import keys, wording
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read a result or an unfinished path; check result.h5 if a result keeps fields.  Call on one rank.
+    """Read a result or an unfinished path, and check its result.h5, if any.  Call on one rank.
 
     Raises:
         CaseError: a file is missing, damaged, or from another program or run.
@@ -34,10 +34,8 @@ def read(directory: Path) -> dict[str, Any]:
 def check_to_draw(directory: Path) -> str:
     """Check that the plottable files in `directory` belong to one run.  Call on one rank.
 
-    The file result.h5 is required, result.json is optional.  Returns the status of an unfinished path, else nothing.
-
-    Raises:
-        CaseError: result.h5 is missing, or a file is damaged, or from another program or run.
+    A folder without result.json and checkpoint needs result.h5.  Returns the status of an unfinished path, else "".
+    Raises CaseError if a needed file is missing, or a file is damaged, or from another program or run.
     """
     # Also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
@@ -76,7 +74,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
 
 
 def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
-    """Raise CaseError with the keys, or the rank counts, in which a case differs from a stored case."""
+    """Raise CaseError with the keys, or rank counts, that differ between a case and a stored case."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
     before, now = (

@@ -23,9 +23,9 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
-    """Return the bond law of a cell.  Collective.
+    """Return the bond law for debonding that `grows`, or for its onset alone.  Collective.
 
-    The law of released energies needs tips: debonding that `grows` creates them, prescribed debonded faces have them.
+    The law of released energies needs tips: growing debonding creates them, prescribed debonded faces have them.
 
     Raises:
         CaseError: tips need the inverse dual operator, which the solver does not have.
@@ -43,7 +43,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return energy release rates at all tips under in-plane loads.  Collective."""
+    """Return energy release rates at all tips under in-plane `loads`.  They are empty without tips.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
@@ -85,12 +85,9 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
 
 
 def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> tuple[float, float]:
-    """Return the fibre number and the direction of the most utilised bond of a new point.  Collective.
+    """Return fibre number, from 1, and direction of a new point's most utilised bond.  Collective.
 
-    Among equally utilised bonds, the lowest fibre number comes first, then the lowest direction.
-
-    Returns:
-        the number, from 1, and degrees; NaN if no bond carries more than the solver's error.
+    Ties: lowest fibre, then direction (degrees).  Returns (NaN, NaN) if no bond carries more than the solver's error.
     """
     cell, sizes = context.cell, list[Float]()
     for problem, state in zip(context.loads.interfaces.problems, point.state.problems, strict=True):
@@ -106,7 +103,7 @@ def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_point
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return the [[interface]] section numbers, from 1, of `pair`; None if the case has at most one section."""
+    """Return [[interface]] section numbers, from 1, for indices `pair`, or None in cases with at most one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 

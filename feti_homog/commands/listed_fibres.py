@@ -91,8 +91,7 @@ class ListedFibres:
 def read(source: Path) -> ListedFibres:
     """Read the fibres of a case file or result folder.  On one rank.
 
-    Raises:
-        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
+    Raises CaseError or MeshError if the source is faulty, or a fibre is neither round nor an ellipse.
     """
     fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
     sizes = np.column_stack([fibres.ellipses.centres, fibres.radii, fibres.coatings])

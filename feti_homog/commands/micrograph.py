@@ -12,8 +12,8 @@ from feti_homog.typing import Float
 def fibres(path: Path, pixel: float) -> tuple[Float, str]:
     """Return the round fibres in an image as circles (n, 3) and as a table.  On one rank.
 
-    Raises:
-        CaseError: the image is faulty or has no fibres.
+    Circles are x, y and radius; `pixel` is the side of a pixel.  Raises CaseError for a faulty image or one without
+    fibres.
     """
     image = label_image.read_image(path, is_grey=True)[::-1].astype(float)  # the first row of an image is the upper one
     if not -1e100 < image.min() < image.max() < 1e100:
@@ -30,7 +30,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw circles over an image as TABLE_circles.png; return this name.  Raises CaseError if it names the image."""
+    """Draw circles over an image into TABLE_circles.png.  Returns its path.  Raises CaseError if `path` is the same."""
     from feti_homog.report.plots import plot_helpers  # with Matplotlib
 
     picture = table.with_name(f"{table.stem}_circles.png")

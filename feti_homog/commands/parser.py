@@ -49,7 +49,7 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A command-line parser whose errors are CaseError; the program prints the error and exits with code 2."""
+    """A command-line parser that raises CaseError for errors, so that the program exits with code 2."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
@@ -184,7 +184,7 @@ def length(word: str) -> float:
 
 
 def size(word: str) -> tuple[float, float]:
-    """Convert a word such as 9x7.5 to two lengths.  Raises ArgumentTypeError."""
+    """Convert a word such as 9x7.5 to two lengths in centimetres, at least 2.  Raises ArgumentTypeError."""
     is_pair = re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,3})?x[0-9]{1,3}(\.[0-9]{1,3})?", word)
     if not is_pair or min(map(float, word.split("x"))) < 2.0:  # less than a picture's text needs
         raise argparse.ArgumentTypeError(f"{word!r}: expected width and height of at least 2 cm, such as 9x7")

@@ -14,7 +14,7 @@ from feti_homog.typing import Intracomm
 
 
 def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Draw the pictures of a stored result again."""
+    """Draw the pictures of a stored result again.  Collective."""
     from feti_homog.report.plots import figures, plot_helpers
 
     directory = _result_folder(arguments)
@@ -30,7 +30,7 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the page report.html of a result."""
+    """Write the page report.html of a result.  Collective."""
     from feti_homog.report import page
 
     directory = _result_folder(arguments)
@@ -41,7 +41,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the states of a result to VTK files."""
+    """Write the states of a result to VTK files.  Collective."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)
@@ -51,7 +51,7 @@ def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the material card of a result, or write it to a file."""
+    """Print the material card of a result, or write it to a file.  Collective."""
     from feti_homog.report.cards import export
 
     directory = _result_folder(arguments)
@@ -62,7 +62,7 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print or write a table of the fibres of a case, result or image; on writing, also draw an image's circles."""
+    """Print or write the fibre table of a case, result or image; `--out` adds a picture of the image.  Collective."""
     from feti_homog.commands import listed_fibres, micrograph
 
     if arguments.image is None:

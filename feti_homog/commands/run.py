@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Run the case file in the arguments.  Collective."""
+    """Run the case file in the arguments.  Collective.  Raises CaseError for `--resume` without a path."""
     from feti_homog.analysis import runner
     from feti_homog.results import output_folder
 
@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of all keys, or of the keys, sections and results that contain the given words."""
+    """Print the reference of all keys, or of entries that contain the given words.  Collective."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 
@@ -47,5 +47,5 @@ def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def options(_: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the PETSc options that the solver accepts."""
+    """Print the PETSc options that the solver accepts.  Collective."""
     mpi_errors.on_root_only(comm, standard_streams.print_product, option_table.help_text())

@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """List the sweep cases, or run all cases or a single case.  Collective."""
+    """List the sweep cases, or run all cases or a single case.  Collective.  Raises CaseError if `--out` is missing."""
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     cases = mpi_errors.on_root(comm, sweep_cases.load, arguments.case)
@@ -27,7 +27,7 @@ def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the tables and the picture of a sweep."""
+    """Write the tables and the picture of a sweep.  Collective."""
     from feti_homog.studies import collect as tables
 
     for line in mpi_errors.on_root_only(comm, tables.collect, arguments.directory, not arguments.no_pictures) or []:

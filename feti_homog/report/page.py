@@ -35,19 +35,19 @@ PICTURES = {
     "mesh_error": "Estimated error of the mesh",
     "sensitivities": "Relative changes of constants with each parameter",
 }
-MOST_ROWS = 60  # of a table of points
+MOST_ROWS = 60  # rows of a table of points
 # The policy lets the page fetch nothing, whatever the content.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def write(directory: Path) -> Path:
-    """Write `directory`/report.html from result.json and the pictures in the folder; return its path.
+    """Write `directory`/report.html from result.json and the stored pictures; return its path.
 
     Call on one rank.
 
     Raises:
         CaseError: the folder has no result, is the folder of a sweep, or has a missing or damaged file.
-        FetiHomogError: the report cannot be written.
+        FetiHomogError: result.json cannot be read, or the report cannot be written.
     """
     if not directory.is_dir():
         raise CaseError(f"cannot report {directory}: there is no such folder")
@@ -65,8 +65,7 @@ def write(directory: Path) -> Path:
 def page(document: Document, directory: Path) -> str:
     """Return the HTML page of a result.
 
-    Raises:
-        OSError, KeyError, TypeError, ValueError: a result file is missing or damaged.
+    Raises OSError, KeyError, TypeError or ValueError if a result file is missing or damaged.
     """
     title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
     style = files.joinpath("page.css").read_text(encoding="utf-8")
@@ -85,7 +84,7 @@ def page(document: Document, directory: Path) -> str:
     ]
     texts = dict[str, str]()
     for form in export.FORMATS:
-        with suppress(CaseError):  # of a result without a material, or one that the format cannot carry
+        with suppress(CaseError):  # the result has no material that the format can carry
             texts[f"Material card, {form}"] = export.card_of(document, form)
     texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
     *cards, case = (

@@ -1,4 +1,4 @@
-"""Write files that appear complete or not at all, even if the writer is killed.
+"""Write files that appear complete or not at all, even if the writer is killed; `append` alone extends a file in place.
 
 The writer waits until both the content and the name of a file are on the disk.
 """
@@ -16,7 +16,7 @@ from feti_homog.system.runtime import file_locks
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Replace the file `path` by the output of `write`, in one step; return `path`.
 
-    `write` gets the name of an unfinished file in the same folder.
+    `write` gets the name of an unfinished file in the same folder.  After any exception the unfinished file is removed.
 
     Raises:
         FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
@@ -37,7 +37,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """Replace the content of a file by a string, in one step as `replace` does."""
+    """Replace the content of a file by a string in UTF-8, and return `path`.  Raises like `replace`."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 
@@ -53,13 +53,11 @@ def commit(part: Path, path: Path) -> None:
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write bytes at position `start` of a file, and drop all former bytes from there on.
+    """Write `content` at position `start` of a file; drop all former bytes from there on.
 
-    If the content `lasts`, the function waits until the bytes are on the disk. A killed writer leaves unfinished bytes
-    at the file end, which a reader must recognize.
-
-    Raises:
-        FetiHomogError: the file cannot be written.
+    At position 0 the function creates the file and its folder.  If the content `lasts`, it waits until the bytes are on
+    the disk.  A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises
+    FetiHomogError if the file cannot be written.
     """
     with file_errors("write", path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,14 +71,17 @@ def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
 
 
 def rename(old: Path, new: Path) -> None:
-    """Rename a file or folder, and wait until the name is on the disk.  Raises OSError."""
+    """Rename a file or folder, and wait until the name is on the disk, if possible.  Raises OSError."""
     os.replace(old, new)
     with contextlib.suppress(OSError):  # not every file system synchronises folders
         _synchronise(new.parent)
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files of ended writers, or of all writers if this process writes `alone`."""
+    """Remove the unfinished files of `names` in a folder, as far as possible.
+
+    Unless this process writes there `alone`, files of running writers stay.
+    """
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):
@@ -90,7 +91,7 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """Turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH"."""
+    """Context manager: turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH: REASON"."""
     try:
         yield
     except (OSError, RuntimeError) as error:

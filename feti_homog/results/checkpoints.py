@@ -3,10 +3,10 @@
 An event holds load, bond states and scalars.  While there is room, the event also holds multipliers and jumps; without
 them, a resumed run computes the equilibrium of the event again.
 
-The file is `checkpoint/events` in the result folder, one record per event: a prefix, content length and CRC-32
-checksums of content and prefix, then the content.  The first content is the run's signature, every other content an
-event packed by zlib: a JSON line with names, types and shapes of its arrays, then their bytes.  A killed run may leave
-an incomplete last record, which does not count.
+The file is `checkpoint/events` in the result folder.  A line with the format comes first, then records.  A record is a
+prefix (content length, CRC-32 of the content, CRC-32 of both numbers) and its content.  The first record holds the
+run's signature, every other record an event packed by zlib: a JSON line with names, types and shapes of its arrays,
+then their bytes.  A killed run may leave an incomplete last record, which does not count.
 """
 
 import contextlib
@@ -52,7 +52,7 @@ def room_of(case: Case) -> int | None:
 
 
 class EventsInMemory:
-    """A store of distributed events in memory, for runs without files; every method is collective.
+    """A store of distributed events in memory, for runs without files.  Every method is collective.
 
     Attributes:
         room: total size in bytes, beyond which further events have no multipliers; None without a limit.
@@ -66,18 +66,16 @@ class EventsInMemory:
         self._events, self._bytes = [], 0
 
     def count(self) -> int:
-        """Check all events; return the number of events.
+        """Return the number of events; `Checkpoint` checks its file before.
 
-        Raises:
-            CaseError: an event is unreadable or of another run.
+        Raises CaseError if the file is damaged, or of another run.
         """
         return len(self._events)
 
     def read(self, number: int) -> Arrays:
-        """Return an event, with this rank's part of each distributed array.
+        """Return event `number`, with this rank's part of each distributed array.
 
-        Raises:
-            CaseError: the event is unreadable.
+        Raises CaseError if the event is unreadable.
         """
         return unpacked(self._events[number])
 
@@ -97,7 +95,7 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Select the arrays of an event to store after `size` bytes of events."""
+        """Return an event to store.  It has no multipliers and jumps if `size` bytes of events fill the room."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
@@ -171,18 +169,16 @@ def begin(signature: str) -> bytes:
 
 
 def record(content: bytes) -> bytes:
-    """Build a record: a prefix, then the content."""
+    """Return `content` as a record of the event file, with its prefix."""
     numbers = len(content), zlib.crc32(content)
     return PREFIX.pack(*numbers, zlib.crc32(b"%d %d" % numbers)) + content
 
 
 def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
-    """Yield the end position and the content of each record in an event file.
+    """Yield the end position and the content of each complete record in an event file.
 
-    Reading begins at the first record, or at `start`, the end position of a record.
-
-    Raises:
-        CaseError: the file has another format or is damaged.
+    Reading begins at the first record, or at `start`, the end position of a record.  Raises CaseError if the file is
+    unreadable or damaged, or has another format.
     """
     try:
         with path.open("rb") as stream:
@@ -224,7 +220,7 @@ def packed(event: Arrays) -> bytes:
 
 
 def unpacked(content: bytes) -> Arrays:
-    """Decompress the content of a record into an event, up to a size that no event has.  Raises CaseError."""
+    """Decompress the content of a record into an event.  Raises CaseError if it is damaged or too large."""
     try:
         data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 16 * len(content)))
         event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
@@ -256,7 +252,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove it, so that no run finds a partial folder.  Call on one rank.
+    """Rename the checkpoint folder, then remove it, so that no run finds a part of it.  Call on one rank.
 
     Raises:
         FetiHomogError: the folder cannot be renamed.
@@ -270,7 +266,7 @@ def remove(directory: Path) -> None:
 
 
 def _remove_events(folder: Path) -> None:
-    """Remove the events of a folder as far as possible; the next run removes the rest."""
+    """Remove the event file and its folder as far as possible.  The next run removes the rest."""
     with contextlib.suppress(OSError):
         (folder / NAME).unlink(missing_ok=True)
         folder.rmdir()

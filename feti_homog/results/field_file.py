@@ -45,10 +45,10 @@ class _Rows:
 class FieldFile:
     """The unfinished file `directory`/result.h5; every method is collective over `comm`.
 
-    `field_layout` lists tables, attributes and views of tables.
+    `field_layout` lists tables, attributes and views of tables.  An array without rows has shape (0, ...).
 
     Until `close` the file has the name `part`. A `with` block closes the file at its end. An error that all ranks raise
-    removes the file; any other exception leaves the file unfinished.  Empty arrays have shapes (0, 2).
+    removes the file; any other exception leaves the file unfinished.
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
@@ -89,7 +89,7 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: field_layout.StatePart) -> None:
-        """Add state `number` (0, 1, ...) and flush the file; cell means must be equal on all ranks."""
+        """Add state `number` (0, 1, ...) and flush the file.  Attributes must be equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))
@@ -99,7 +99,7 @@ class FieldFile:
         """Complete the file, give it its final name, and return its path."""
 
         def complete() -> None:
-            """Add views and rename the file, on one rank: on all, views cost as much as tables."""
+            """Add views and rename the file.  On one rank: on all ranks, views would cost as much as tables."""
             # No lock: only this process has the file open, and some file systems have no locks.
             with h5py.File(self.part, "r", locking=False) as file:
                 size = (1 << 12) * (1 + len(field_layout.views_of(file)))  # measured: 0.9 KB for each view on average
@@ -128,7 +128,7 @@ class FieldFile:
             self._remove()
 
     def _bytes(self, part: Any) -> int:
-        """Return the total size of the tables of a part, in bytes, over all ranks."""
+        """Return an upper bound (bytes) for a part's tables and their headers, over all ranks."""
         return sum(
             (1 << 12)  # bound of HDF5's table header; the measured size is 0.6 KB
             + np.dtype(d.dtype).itemsize
@@ -160,7 +160,7 @@ class FieldFile:
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         """Call a function, and agree on its errors by the collective call `agreed`.
 
-        After an error the file is removed, and all ranks raise FetiHomogError.
+        Returns the function's result.  After a FetiHomogError of any rank, all ranks remove the file and raise.
         """
         try:
             return agreed(self._comm, _with_write_errors, self.path, function, *args)
@@ -169,7 +169,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Truncate, close and remove the file; on a full disk HDF5 closes only empty files."""
+        """Truncate, close and remove the file.  On a full disk HDF5 closes only empty files.  Collective."""
         self._is_open = False
         file_locks.files.discard(self.part)
         if self._comm.rank == 0:
@@ -184,13 +184,16 @@ class FieldFile:
 
 
 def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """Call a function, and turn its write errors into FetiHomogError about `path`."""
+    """Return function(*args); its write errors become FetiHomogError about `path`."""
     with atomic.file_errors("write", path):
         return function(*args)
 
 
 def _create(part: Path, size: int) -> None:
-    """Create an empty HDF5 file by plain system calls, since HDF5 may crash or hang if they fail."""
+    """Create an empty HDF5 file and reserve `size` bytes for it.  Raises OSError, after it removes the file.
+
+    The function uses plain system calls, since HDF5 may crash or hang if they fail.
+    """
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with h5py.File("empty", "w", driver="core", backing_store=False) as file:
@@ -210,13 +213,13 @@ def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Reserve disk space for a file: without space, MPI-IO may wait forever."""
+    """Reserve `size` bytes from `start` on for a file.  Without space, MPI-IO may wait forever.  Raises OSError."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: Mapping[str, str]) -> None:
-    """Create a table and write this rank's rows; a rank without rows selects none.  Collective."""
+    """Create a table and write this rank's rows.  A rank without rows selects none.  Collective."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
     _set_attributes(file, name, texts)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()

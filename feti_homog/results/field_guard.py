@@ -26,10 +26,11 @@ MAY_BE_NAN = ("centre", "radius", "stress_33", "mesh_error")
 
 
 def require_own(path: Path, state: int | None = None) -> None:
-    """Refuse links other than hard links, tables that are larger than the file or lie elsewhere, and other layouts.
+    """Check result.h5 in a child process, because HDF5 may crash on damaged files.
 
-    Other links may lead to pipes, other files, or in circles.  Numbers must be in RANGES, in all states or one `state`.
-    A child process reads the file, because HDF5 may crash on it.  Raises CaseError; FetiHomogError if unreadable.
+    The check refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than
+    the file or outside it; other layouts; numbers outside RANGES, in all states or in one `state`.  Raises CaseError
+    for these faults and a missing file, FetiHomogError for missing permissions.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
@@ -39,8 +40,8 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 
 def require_tables(path: Path, state: int | None) -> None:
-    """Check a file like `require_own`, but in this process."""
-    room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # of views, which show tables, and of tables
+    """Check result.h5 in this process.  Raises like `require_own`."""
+    room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # bytes left for views, and for tables
     try:
         with h5py.File(path, "r", locking=False) as file:
             groups = [file["/"]]
@@ -70,7 +71,7 @@ def require_tables(path: Path, state: int | None) -> None:
 
 
 def _require_layout(path: Path, file: Any, state: int | None) -> None:
-    """Compare shapes, types and ranges with `field_layout`; points, triangles and fibres give the row counts."""
+    """Compare shapes, types and ranges of all tables and attributes with `field_layout`.  Raises CaseError."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
     counts = {symbol: (*(entry.shape or ()), 0)[0] for symbol, entry in entries.items()}
@@ -103,7 +104,7 @@ def _blocks(table: Any) -> Iterator[Any]:
 
 
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
-    """Compare the numbers of a table or attribute with RANGES, a block of rows at a time."""
+    """Compare a table or attribute with RANGES, a block of rows at a time.  Raises CaseError."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
     top = np.float64(counts[high] - (high != "f") if isinstance(high, str) else high)
     for values in map(np.asarray, _blocks(table) if table.ndim else [table]):
@@ -113,7 +114,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 
 
 def _require_mesh(path: Path, file: Any) -> None:
-    """Require a case with all phases, elements with an area, fibres in the mesh, and interface nodes at mesh nodes."""
+    """Check case, element areas, fibres, interface nodes, and names of phases and states.  Raises CaseError."""
     try:
         cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

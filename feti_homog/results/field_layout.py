@@ -37,9 +37,9 @@ class Header:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains and bodies.
+    """This rank's n nodes and m triangles, one subdomain after the other.
 
-    Each group of 4**refine consecutive triangles fills one coarse triangle.
+    Nodes are torn between subdomains and bodies.  Each 4**refine consecutive triangles fill one coarse triangle.
     """
 
     points: Float = described("positions of the nodes", records.LENGTH, "(n, 2)")
@@ -78,7 +78,7 @@ class FibrePart:
 
 @dataclass(frozen=True)
 class InterfacePart:
-    """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
+    """The k fibre-matrix interface nodes with multipliers on this rank; k may be 0."""
 
     points: Float = described("positions of the interface nodes", records.LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
@@ -149,26 +149,27 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return the fields of a part that become datasets, because they have rows."""
+    """Return descriptions, by name, of the fields that become datasets.  These have rows."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the values, by name, of the fields of a part that become attributes, because they have no rows."""
+    """Return values, by name, of the fields that become attributes.  These have no rows."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 
 def rows_of(description: records.Description) -> str:
-    """Return the row kind of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; else empty."""
+    """Return the row kind of a dataset: `n`, `m`, `k` or `f`, as in the module.  It is empty for attributes."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SpatialStatePart(StatePart):
-    """One state in generalized plane strain and this rank's part of its fields.
+    """One state in generalized plane strain or conduction, and this rank's part of its fields.
 
-    Fields are constant along x3, except for the displacement E33 x3.
+    Fields are constant along x3, except for the displacement E33 x3.  In conduction the displacement along x3 is the
+    temperature, and stresses 33, 23 and 13 are minus the flux.
     """
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.SPATIAL_STRAINS)}", shape="(6,)")
@@ -215,7 +216,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
-    """Return the view of a symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with some `entries`."""
+    """Return the view of a symmetric tensor [11, 12, 13, 21, ..., 33].  Components without an entry are 0."""
     places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
     columns = {place: entries[entry] for place, entry in places if entry in entries}
     sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
@@ -234,7 +235,7 @@ COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
 )
-AXIAL = "axial_displacement"  # dataset that only states of generalized plane strain have
+AXIAL = "axial_displacement"  # dataset of states that are not plane
 
 # The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
@@ -242,7 +243,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     GROUP_OF_STATES: (_vector("displacement"), _tensor("stress", "stress", STRESS_TENSOR), *COLUMNS),
 }
 
-# The views of a state in generalized plane strain.
+# The views of a state in generalized plane strain or conduction.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
     _tensor(

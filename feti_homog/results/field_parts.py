@@ -91,9 +91,10 @@ def state_parts(
     point: int,
     fields: recovered_fields.RecoveredFields,
 ) -> Iterator[StatePart]:
-    """Yield the part of each state, from its responses in all problems and the recovered `fields`.  Collective.
+    """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
 
-    A problem whose response is None has zero fields.  Conduction takes the place of the axial problem.
+    A state has a response in the plane problem and, if there is one, in the axial problem; conduction takes the place
+    of the axial problem.  A problem without a response (None) has zero fields.
 
     Raises:
         ValueError: a state has no response.
@@ -118,7 +119,7 @@ def state_parts(
         if plane is not None and cell.axial is None:
             laws_of = [cell.case.material_of(s.submesh.phase) for s in cell.parts]
             rules = np.reshape([laws.out_of_plane(law, cell.case.analysis.plane)[0] for law in laws_of], (-1, 3))
-            rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # of elements
+            rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # a row for each element
             common["stress_33"] = np.einsum("ev,ev->e", common["stress"], rules)
             common |= _at_nodes(cell, response, in_plane)
             yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)

@@ -27,7 +27,7 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Successive turning points differ by more than `threshold`; an end of the curve counts if it differs as much.
+    Successive turning points, and so the ends of the curve, differ by more than `threshold`; a flatter curve has none.
     """
     entries, low, high, rises, falls = list[int](), 0, 0, True, True
     for number, value in enumerate(values):
@@ -46,8 +46,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path.
 
     The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points without such a
-    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  A path that
-    stopped early without a fall has no peak, but a largest stress `so_far`.
+    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  The entry
+    `so_far` marks a path that is unfinished, or stopped early without a fall.
 
     On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
@@ -87,7 +87,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
-    """Describe the bond of a landmark by fibre and direction; empty if unknown.  `title`: such as "first_break_"."""
+    """Describe the bond of a landmark by fibre and direction, or "" if unknown.  `title` is such as "first_break_"."""
     if peak.get(f"{title}fibre") is None:
         return ""
     return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"
@@ -100,7 +100,7 @@ def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> l
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the larger relative fall of the stress after the peak: to the valley, or to the end of the leg."""
+    """Return the larger relative fall of the stress after the peak: to the valley or leg end.  It is at least 0."""
     leg = path_curves.legs_of(document)
     last = stresses_of(document, peak)[np.flatnonzero(leg == leg[peak["event"]])[-1]]
     remaining = (last, peak.get("stress_left", peak["stress"]))
@@ -108,16 +108,16 @@ def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float
 
 
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Name the largest stress: PEAK if the stress falls afterwards, SO_FAR on an unfinished path, else LARGEST."""
+    """Name the largest stress: PEAK before a fall, SO_FAR on an unfinished path, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
 
 
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
-    """Describe the load at which a phase passes its strength before the peak, between the kept points `numbers`.
+    """Return a line for each phase that passes its strength before the peak.
 
-    Utilisations are interpolated linearly between these points, and from the unloaded cell to the first point.
+    The lines give stress and strain.  Utilisations at the kept points `numbers` are interpolated linearly, from 0 on.
     """
     lines, component = list[str](), voigt.voigt_names(len(document["path"][0]["stress"]))[0].index(peak["strain_name"])
     means = [np.array([point[name] for point in document["path"]])[numbers, component] for name in ("stress", "strain")]
@@ -151,12 +151,12 @@ Drop = tuple[float, int, int]
 
 
 def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
-    """Return the numbers of the points whose fields are stored, in ascending order.
+    """Return the numbers of the points to store with fields, in ascending order.
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
             marked points if they all fit, points around the deepest drops for half the rest, and evenly spaced points.
-        legs: number of legs of an event path, whose first leg passes all equilibria; 0 for increments.
+        legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
     """
     if states == "all" or not points:
         return list(range(len(points)))
@@ -180,10 +180,10 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
 
 def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
-    """Return the stress drops, and the strain jumps at one load, that exceed LEAST_DROP; `legs` is as in `kept`.
+    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress.
 
-    A drop leads from a peak to the next valley.  On the first leg of an event path, a drop also leads from each load at
-    which bonds break to the next point that a rising load reaches.  A jump leads across all points at one load.
+    A drop leads from a peak to the next valley.  On the first of `legs` legs (see `kept`), a drop also leads from each
+    load at which bonds break to the next point that a rising load reaches.  A jump leads across all points at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
@@ -236,7 +236,7 @@ def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | Non
 
 
 def kept_points(document: path_curves.Document) -> list[int]:
-    """Return the points with stored fields, in state order; all points if no fields are stored."""
+    """Return the points with stored fields, in state order.  If no fields are stored, return all points."""
     return list(document.get("states") or range(len(document["path"])))
 
 

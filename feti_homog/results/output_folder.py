@@ -40,12 +40,9 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that a run can use `directory`: it is writable or can be created, and no other run uses it.
+    """Check that a run can use the folder `directory`, and create nothing.
 
-    The check creates no file or folder.
-
-    Raises:
-        CaseError: the folder cannot be used.
+    The folder, or the folder in which it will lie, must be writable, and no other run may use it.  Raises CaseError.
     """
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
@@ -93,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about the other result that a run of `case` replaces, or "".  Call on one rank.
+    """Return a line about the different result that a run of `case` replaces, or "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -119,7 +116,7 @@ def replaced(directory: Path, case: Case) -> str:
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
-    """Return the error for a foreign file with the name of a result."""
+    """Return the error for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
     return CaseError(
         f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
         "move it away or choose another folder"
@@ -127,7 +124,7 @@ def foreign(directory: Path, name: str, kind: str) -> CaseError:
 
 
 def _is_own(path: Path) -> bool:
-    """Return whether any version of the program wrote this result.json, result.h5 or events.log."""
+    """Return whether any version of the program wrote this result.json, result.h5, result.lock or events.log."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))
@@ -142,10 +139,11 @@ def _is_own(path: Path) -> bool:
 
 
 def latest(directory: Path) -> dict[str, Any]:
-    """Return result.json, or an unfinished path if it has more points.  Call on one rank.
+    """Return the document of result.json or of the checkpoint.  Call on one rank.
 
-    For an unfinished path, the entry `unfinished` and the `status` give the number of points and the load.
-    Raises CaseError for a missing, damaged or unreadable file.
+    The checkpoint counts if it has more points, or result.json is missing or of another case; then `unfinished` and
+    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, FetiHomogError for
+    missing permissions.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -184,18 +182,19 @@ def refuse_begun(directory: Path) -> None:
 
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
-    """Create the result folder, and lock the folder during a block.  Collective.
+    """Context manager: create the result folder, and lock the folder during a block.  Collective.
 
     Removes unfinished files from earlier runs, and at the end new folders that stayed empty.  On a file system without
     locks, `say` gets a warning and the run continues without a lock.
 
     Raises:
         CaseError: the folder cannot be made, or another run has locked it.
+        FetiHomogError: the lock file cannot be created or locked.
     """
     lock = file_locks.Lock(directory / LOCK)
 
     def hold() -> tuple[list[Path], str]:
-        """Return new folders, innermost first, and a warning or an empty string."""
+        """Create and lock the folder.  Returns new folders, innermost first, and a warning or an empty string."""
         made = [path for path in (directory, *directory.parents) if not path.exists()]
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -229,7 +228,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove the result files whose names are not in `written`, and events if no log is written.  Call on one rank."""
+    """Remove result files that are not in `written`, and events if no log is written.  Call on one rank."""
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

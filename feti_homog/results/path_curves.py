@@ -23,12 +23,12 @@ Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """Return the waypoints, or the single load, with all components by name."""
+    """Return the case's waypoints, or its single load, with all components by name."""
     return load_sections.completed(_given(document), document["case"]["analysis"]["plane"])
 
 
 def named_components(document: Document) -> list[int]:
-    """Return the components that the waypoints name, in Voigt order."""
+    """Return the indices of the components that the waypoints name, in Voigt order."""
     loads = _given(document)
     first = load_sections.first_named(loads, document["case"]["analysis"]["plane"])
     return [component for component, number in enumerate(first.values()) if number < len(loads)]
@@ -42,7 +42,7 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
 
 
 def changed_components(document: Document) -> list[int]:
-    """Return the components that the waypoints change, in Voigt order."""
+    """Return the indices of the components that the waypoints change, in Voigt order."""
     pairs, matches = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for target in targets(document):
@@ -54,9 +54,10 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Return the component with the largest strain up to the end of the leg on which damage begins.
+    """Return the index of the component with the largest strain until damage begins.
 
-    Only components that the waypoints change are compared, or all components if only the temperature changes.
+    The search ends with the leg on which damage begins.  It compares the components that the waypoints change, or all
+    if only the temperature changes.
     """
     largest = np.abs([point["strain"] for point in leading_points(document, ("broke", "softened"))]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
@@ -64,13 +65,13 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg on which a number in `counts` is not 0; else all points."""
+    """Return the points up to the end of the first leg with a positive count in `counts`; else all points."""
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield, from the second leg on: number, component with the largest strain change, point of its largest stress."""
+    """Yield leg, component with the largest strain change, and point of its largest stress, from leg 2 on."""
     leg, changed = legs_of(document), changed_components(document)
     strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
     for number in range(2, legs(document) + 1):
@@ -88,7 +89,7 @@ def legs_of(document: Document) -> Float:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of (n, c) with entries above `share` times the largest entry."""
+    """Return the columns of (n, c) with an entry above `share` times the largest.  Magnitudes are compared."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
@@ -100,7 +101,7 @@ def shown_stresses(document: Document) -> list[int]:
 
 
 def what_rises(document: Document) -> str:
-    """Name the rising quantity on the first leg of a path: "strain" if only strains rise, else "load"."""
+    """Name the rising quantity on the first leg.  It is "strain" if only strains rise, else "load"."""
     first = targets(document)[0]
     other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
@@ -121,7 +122,7 @@ def first_leg(document: Document) -> int:
 
 
 def ends_of_legs(document: Document) -> list[int]:
-    """Return the point numbers at waypoints."""
+    """Return the number of the last point at each waypoint that the path reaches."""
     position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
     matches = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
     return [int(numbers[-1]) for numbers in matches if len(numbers)]
@@ -139,7 +140,7 @@ def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
 
 
 def scales_with_toughness(document: Document) -> bool:
-    """Return whether strains and stresses of a path are proportional to the root of the toughness.
+    """Return whether strains and stresses are proportional to the root of the toughness.
 
     This holds if bonds break by energy, on springs that do not depend on the toughness.
     """
@@ -149,11 +150,11 @@ def scales_with_toughness(document: Document) -> bool:
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
-    """Return stresses and strains (v, 2 c) at the corners of a proportional path under a rising load.
+    """Return the corners (v, 2 c) of a proportional path under a rising load, stresses first.
 
     Where bonds break at a load t, all bonds that cannot carry t without them also break.  The cell then follows the
-    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
-    and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t', and
+    the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])
@@ -167,7 +168,7 @@ def load_controlled(points: Sequence[Point]) -> Float:
 def rising_strain(document: Document) -> Float | None:
     """Return stresses and leading strain (v, c + 1) of a one-leg path under a rising load.
 
-    The strain is made positive. The result is None for other paths, or if the strain does not rise with the load.
+    The strain is made positive. Returns None without a path, with several legs, or if the strain falls somewhere.
     """
     points = document.get("path")
     if not points or legs(document) != 1:

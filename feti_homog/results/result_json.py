@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write`."""
+    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write` for values."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -65,6 +65,7 @@ def read(directory: Path) -> dict[str, Any]:
 
     Raises:
         CaseError: the file is missing, is not a JSON table or has changed, or its layout has another version.
+        FetiHomogError: the file has no read permission.
     """
     path = Path(directory) / NAME
     try:
@@ -108,7 +109,7 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the CSV columns for records of a class, for the reference manual."""
+    """Yield the CSV columns for records of a class, with units and meanings."""
     for name, description in _in_columns(kind).items():
         # The components in the plane are among the spatial components, in the same order.
         for component in description.spatial_components or description.components or (name,):
@@ -117,12 +118,10 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 
 
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
-    """Write records of one class as rows: numbers under their names, arrays under their component names.
+    """Write records of one class as rows, and return the path.  Call on one rank.
 
-    Empty columns, arrays without components and nested records are left out.  Call on one rank.
-
-    Raises:
-        FetiHomogError: the table cannot be written.
+    Columns are numbers, and array components; empty columns, other arrays and nested records are left out.  Raises
+    FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []
@@ -140,14 +139,14 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:
-    """Return the record fields that fill columns: numbers, and arrays with named components."""
+    """Return the record fields that fill columns.  These are numbers, and arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV, with an apostrophe before strings that a spreadsheet would evaluate."""
+    """Return rows as CSV.  An apostrophe precedes strings that a spreadsheet would evaluate."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -155,9 +154,10 @@ def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
 
 
 class EventLog:
-    """The event log in a result folder, which rank 0 writes; the first line replaces an earlier log.
+    """The event log in a result folder, which rank 0 writes.
 
-    After a write error `say` gets one warning, and the path continues without the log, which holds no results.
+    The first line replaces an earlier log.  After a write error, `say` gets a warning, and the path continues without
+    it.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
@@ -166,7 +166,7 @@ class EventLog:
         self._stream: TextIO | None = None
 
     def write(self, line: str) -> None:
-        """Append a line to the log."""
+        """Append a line to the log.  Other ranks, and calls after `close`, write nothing."""
         if not self._wanted:
             return
         try:
@@ -182,7 +182,7 @@ class EventLog:
             self.close()
 
     def close(self) -> None:
-        """Close the log."""
+        """Close the log.  Later lines are ignored."""
         self._wanted = False
         if self._stream is not None:
             with contextlib.suppress(OSError):  # the stream has no unwritten line
@@ -190,18 +190,15 @@ class EventLog:
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Serialize a document, with its checksum as last key.  Raises ValueError for NaN."""
+    """Serialize a document, with its checksum as last key.  Raises ValueError for NaN and infinities."""
     text = _text({key: value for key, value in document.items() if key != KEY})
     return _sealed(text, _checksum(text))
 
 
 def loads(text: str) -> dict[str, Any]:
-    """Parse a document and verify its checksum, which is removed.
+    """Parse a document, verify its checksum, if any, and remove the checksum.
 
-    A document without a checksum is not verified.
-
-    Raises:
-        ValueError: the text is not JSON or not a table, or does not match its checksum.
+    Raises ValueError if the text is not JSON or not a table, or does not match its checksum.
     """
     try:
         document = json.loads(text)
@@ -234,10 +231,8 @@ class FileSeal:
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
     """Return the size and checksum of a file.
 
-    Call on the rank that completed the file: other ranks may still see an earlier file of that name.
-
-    Raises:
-        FetiHomogError: the file cannot be read.
+    Call on the rank that completed the file: other ranks may still see an earlier file of that name.  Raises
+    FetiHomogError if the file cannot be read.
     """
     with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -271,7 +266,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize with indents; an array of numbers, or a row of a matrix, takes one line."""
+    """Serialize a value with indents.  An array of numbers, or a row of a matrix, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

@@ -56,7 +56,8 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
     constants do not determine it.
 
     Raises:
-        CaseError: result.h5 is missing or cannot be read, or has no such state.
+        CaseError: result.h5 is missing or damaged, or has no such state.
+        FetiHomogError: result.h5 has no read permission.
     """
     field_guard.require_own(path := Path(out) / field_file.NAME, number)
     with h5py.File(path, "r", locking=False) as file:
@@ -97,7 +98,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Read a state of the interface nodes: displacements of both faces, tractions, jumps."""
+    """Read a state at the interface nodes, with displacements of both faces, tractions, jumps, status and geometry."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
@@ -107,7 +108,7 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Read the tables of a state."""
+    """Read the datasets `places` (paths with K for the state), by the names in `places`."""
     return {name: file[place.replace("/K/", f"/{state}/")][()] for name, place in places.items()}
 
 
@@ -175,7 +176,7 @@ def _grid(state: ViewedState) -> ET.Element:
 
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
-    """Write a .vtkhdf file: the common mesh, and the fields of each state."""
+    """Write a .vtkhdf file with the common mesh and all states.  `read(file, number)` returns a state."""
     count = len(file.get("state", ()))
     with h5py.File(path, "w") as out:
         root = out.create_group("VTKHDF")

@@ -41,14 +41,14 @@ INTERFACE_POINTS = {
     "normal": "vector/interface/normal",
     **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
 }
-# Further arrays in generalized plane strain.
+# Further arrays in generalized plane strain and conduction.
 SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in voigt.AXIAL_STRESSES}
 SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
 LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.values()}
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets of the further state fields with one of the `shapes`, by field name."""
+    """Return the datasets, by field name, of state fields with one of the `shapes`.  LISTED datasets are left out."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -101,9 +101,9 @@ def write(directory: Path) -> list[Path]:
 
 
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
-    """Return the numbers of a whole state by name, each in a row (1, c): load factor, temperature, means.
+    """Return load factor, mean strain and mean stress of a state as rows (1, c).
 
-    Mean strain and stress are vectors in the order [11, 22, 12] or, in generalized plane strain, tensors.
+    The means are vectors [11, 22, 12] or, for states that are not plane, tensors; the temperature is then added.
     """
     names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
     if "temperature" in attributes:

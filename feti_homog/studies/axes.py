@@ -18,7 +18,7 @@ Assignment = dict[toml_files.TomlPath, Any]
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that varies, with a list of values or, for samples, both ends of a range."""
+    """A key that varies.  It has a list of values or, for samples, both ends of a range."""
 
     path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
@@ -91,7 +91,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
 
 
 def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
-    """Draw a Latin hypercube, or independent samples, from the box of the axes."""
+    """Draw a Latin hypercube, or independent samples, from the box of the axes.  `settings` has number and seed."""
     count = settings.samples or 1
     if settings.sampling == "latin":
         from scipy.stats import qmc  # a slow import that few sweeps need
@@ -104,7 +104,7 @@ def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> lis
 
 
 def _is_foreign(path: toml_files.TomlPath) -> bool:
-    """Return whether a path lies outside the sections whose keys can vary."""
+    """Return whether a sweep cannot vary the keys in the section of a path."""
     return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP)
 
 
@@ -114,7 +114,7 @@ def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, or an empty string; sampled ranges need neither step nor count."""
+    """Return the fault of an axis, or an empty string.  Sampled ranges need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"
@@ -150,7 +150,7 @@ def rounded(value: float) -> float:
 
 
 def _of_key(value: float, path: toml_files.TomlPath) -> Any:
-    """Round a value, to an integer if the key accepts only integers."""
+    """Round a value to DIGITS digits, or to an integer if the key accepts only integers."""
     value = rounded(value)
     section = sections.SECTIONS.get(path[0])
     entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

@@ -60,7 +60,7 @@ BEGUN = (Status.RUNNING, Status.INTERRUPTED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason, and the content of result.json or of an unfinished path."""
+    """The progress of a case, the reason, and the content of result.json or an unfinished path."""
 
     status: Status
     reason: str = ""
@@ -77,11 +77,9 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Refuse a folder with another study, or with foreign files under names that a study writes.  On one rank.
+    """Refuse a folder with another study, or with foreign files of a study's names.  On one rank.
 
-    Raises:
-        CaseError: the document of a study is there, or such a file or subfolder is not empty.
-        OSError: the folder cannot be read.
+    Raises CaseError for such a document, file or subfolder that is not empty, OSError if the folder cannot be read.
     """
     for path in sorted(directory.iterdir()):
         if path.name in DOCUMENTS:
@@ -92,7 +90,11 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 
 @contextlib.contextmanager
 def document_lock(directory: Path) -> Iterator[None]:
-    """Lock the document of a study during a block; raise CaseError if the lock stays held.  On one rank."""
+    """Context manager: lock the document of a study during a block.  On one rank.
+
+    A file system without locks has no lock.  Raises CaseError if another process holds the lock for
+    INDEX_LOCK_TIMEOUT_S.
+    """
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:
         try:
@@ -180,7 +182,7 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case, RUNNING while a process holds its lock.  On one rank."""
+    """Return the progress of a case.  Without a result, it is RUNNING while a process holds its lock.  On one rank."""
     state, folder = stored_state(directory, entry), directory / entry.folder
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
@@ -234,10 +236,9 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Rename the result.json of a case, and remove the other result files.  On one rank.
+    """Rename the result.json of a case to result.json.STATUS.  On one rank.
 
-    Raises:
-        FetiHomogError: the folder cannot be written.
+    Also removes the other result files.  Raises FetiHomogError if the folder cannot be written.
     """
     folder = directory / entry.folder
     path = folder / result_json.NAME
@@ -254,7 +255,7 @@ def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> Non
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Return printed lines with the inputs of the failed cases and the reasons of their failures."""
+    """Return lines with the inputs of failed cases and the reasons of failures; [] without cases."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]

@@ -21,7 +21,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep, with its status if there is a folder.  On one rank."""
+    """Return a line for each case of a sweep.  With a folder, lines have the status.  On one rank."""
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
@@ -43,10 +43,11 @@ def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
 def run_all(
     sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool | None
 ) -> None:
-    """Run all sweep cases.  Collective.
+    """Run all unfinished cases of a sweep.  Collective.
 
-    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `quiet` True
-    nothing is printed; with None the first group shows the progress; with False it also prints a line for each case.
+    A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `retry`,
+    failed cases run again.  With `quiet` True nothing is printed; with None the first group shows the progress; with
+    False it also prints a line for each case.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
@@ -113,7 +114,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Make the sweep folder and hold its lock, which jobs of single cases share.  Collective."""
+    """Context manager: make the sweep folder and hold its lock.  Jobs of single cases share the lock.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -142,7 +143,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """A group of ranks that runs sweep cases; `retry` repeats failed cases, `quiet` prints no line about a case."""
+    """A group of ranks that runs sweep cases.  `retry` repeats failed cases; `quiet` prints no lines."""
 
     comm: Intracomm
     directory: Path
@@ -179,10 +180,10 @@ class CaseRunner:
         timeout: float = file_locks.LOCK_TIMEOUT_S,
         advance: Callable[..., Any] = lambda *_: None,
     ) -> tuple[Outcome, str]:
-        """Run a case unless it has finished or failed, or another process holds it.  Collective.
+        """Run a case unless it is finished, failed without `retry`, or held by another process.  Collective.
 
         The group waits `timeout` seconds for the lock of the case; `advance` shows the share of all cases.  Returns the
-        outcome, and the name of another process that holds the case.  Raises FetiHomogError if it cannot write.
+        outcome, and another process that holds the case, else "".  Raises FetiHomogError if a file cannot be written.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
@@ -216,7 +217,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Acquire the lock of a case, and keep the lock if the case must run.  On one rank."""
+        """Lock a case, and keep the lock if the case must run.  On one rank.  Returns and raises as `run` does."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)
@@ -243,10 +244,7 @@ class CaseRunner:
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
     """Return the description of a case, or of a sweep and its first case.  Collective.
 
-    The text is empty except on rank 0.
-
-    Raises:
-        CaseError, MeshError: the document is faulty, or the cell of its first case.
+    The text is empty except on rank 0.  Raises CaseError or MeshError for a faulty document or first case.
     """
     if sections.SWEEP not in document:
         return description.describe(mpi_errors.on_root(comm, cases.parse, document, folder), comm)
@@ -257,7 +255,10 @@ def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
 
 
 def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
-    """Return a heading and the description of the first case.  Collective.  Raises like `describe`."""
+    """Return a heading and the description of the first case.  Collective.
+
+    The text is empty except on rank 0.  Raises like `describe`.
+    """
     check_options(sweep)
     text = description.describe(sweep.cases[0], comm)
     return f"{heading}\n{text}" if comm.rank == 0 else ""

@@ -18,7 +18,7 @@ from feti_homog.studies.predictions import responses
 from feti_homog.studies.sweep_table import PARTS, SweepTable
 
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
-MOST_ROWS = 40  # of the printed table
+MOST_ROWS = 40  # rows of the printed table
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 
@@ -28,11 +28,9 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write the tables and the picture of a sweep to its folder; return the lines to print.  On one rank.
+    """Write the tables and the picture of a sweep to its folder.  On one rank.
 
-    Raises:
-        CaseError: as for `read`.
-        FetiHomogError: a file cannot be written.
+    Returns the lines to print.  Raises CaseError like `read`, and FetiHomogError if a file cannot be written.
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
@@ -55,7 +53,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return printed tables of peaks or constants: means and scatter over realisations, or values at points."""
+    """Return printed tables of peaks or constants.  They show scatter over realisations, or values at points."""
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names
@@ -80,8 +78,7 @@ def means(table: SweepTable) -> list[str]:
 def write(directory: Path, table: SweepTable) -> list[Path]:
     """Write cases.csv and statistics.csv atomically, and return their paths.  On one rank.
 
-    Raises:
-        FetiHomogError: a file cannot be written.
+    Raises FetiHomogError if a file cannot be written.
     """
     columns = [*table.inputs.values()]
     for name, values in table.outputs.items():

@@ -1,7 +1,7 @@
 """Estimate unknowns by weighted least squares, with covariances and undetermined directions; fill fit.json.
 
-Data y have independent errors with standard deviations s, so that residuals are r_i = (f_i(x) - y_i) / s_i.  With
-J = dr/dx the estimate is the minimizer of r^T r within bounds, and its covariance is (J^T J)^-1.
+Data y have independent errors with standard deviations s; the model computes f(x) at the unknowns x.  With residuals
+r_i = (f_i(x) - y_i) / s_i and J = dr/dx the estimate minimizes r^T r within bounds, and its covariance is (J^T J)^-1.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from feti_homog.typing import Array, Float
 
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
-LEAST_CHANCE = 1e-3  # probability of equally large residuals, below which the model is refused
+LEAST_CHANCE = 1e-3  # probability of such or larger residuals, below which the model is refused
 # Directions with a smaller relative singular value are undetermined; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
 STEP, MOST_EVALUATIONS = 1e-5, 60  # the relative step that ends the search is far below 1 % differences and std
@@ -100,7 +100,7 @@ class ParameterEstimates:
 
     @property
     def chance(self) -> float | None:
-        """The probability of equally large residuals under a correct model; None without degrees of freedom."""
+        """The probability of such or larger residuals under a correct model; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
@@ -116,7 +116,7 @@ def estimate(
     """Estimate unknowns within bounds from measured data.
 
     The search takes dogleg steps in the box of the bounds.  If the data do not determine all directions, a trust-region
-    method searches instead, whose steps have no component along an undetermined direction.
+    method searches instead: its steps have no component along an undetermined direction.
 
     Args:
         model: computes the values (m,) at unknowns (n,).
@@ -160,9 +160,12 @@ def summarize(
 
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0) -> list[str]:
-    """Return a message for each direction that the data do not determine."""
+    """Return a message for each undetermined direction; `rows` has the numbers of its unknowns.
+
+    `teeth` counts the teeth of a softening law, 0 for other laws.
+    """
     reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
-    if teeth:  # of a softening law
+    if teeth:  # only softening laws have teeth
         reasons[True] = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a "
         reasons[True] += "staircase; more teeth (softening_tolerance) make it smooth"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
@@ -176,7 +179,7 @@ def _sizes(x: Float) -> Float:
 def fit_document(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: int = 0
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name; numbers that are not finite are None.  `teeth` as `names_of`."""
+    """Return the content of fit.json without its name.  Infinities and NaN become None.  `teeth`: see `names_of`."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
     if misfits and estimates.undetermined:

@@ -57,11 +57,7 @@ class Fit(Study):
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
-        """Return the cases for pairs of a test number and unknowns (n,).
-
-        Raises:
-            CaseError: with the faults of all cases.
-        """
+        """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
             """Restrict the output to numbers, with derivatives unless debonded faces may touch."""
@@ -86,12 +82,12 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the slice of all data that holds the data of a test."""
+        """Return the data of a test as a slice of all data."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on measured names whose meaning differs in ply axes, or an empty string."""
+        """Return a line on measured names that have another meaning in ply axes, or an empty string."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -152,7 +148,10 @@ class Evaluations:
     computed: dict[Point, Float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
-        """Estimate the unknowns.  Collective.  Returns the estimates on rank 0, which directs the other ranks."""
+        """Estimate the unknowns on rank 0, which directs the other ranks.  Collective.
+
+        Other ranks return None.  All ranks raise CaseError or ConvergenceError if the search fails.
+        """
         comm = self.evaluator.comm
         if comm.rank:
             while (question := comm.bcast(None)) is not None:
@@ -170,7 +169,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start; after a misfit or a fault, also from the best of `STARTS` points.  On rank 0."""
+        """Search from the start.  After a misfit or fault, search from the best of `STARTS` points.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
@@ -212,7 +211,7 @@ class Evaluations:
         return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,); by finite differences if necessary.  On rank 0.
+        """Return the derivatives (m, n) of the data at x (n,), exact or by differences.  On rank 0.
 
         With a softening law of few teeth, a step may change no datum: that side of the difference is then computed
         again with twice the step, up to a tenth of the width of the bounds.
@@ -229,7 +228,7 @@ class Evaluations:
         steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
 
         def end(k: int, step: float) -> Point:
-            """Return the point a step of unknown k away, within the bounds."""
+            """Return the unknowns after a step of unknown k, within its bounds."""
             return _rounded([*key[:k], np.clip(key[k] + step, *bounds[k]), *key[k + 1 :]])
 
         ends = [end(k, step) for (k, _), step in steps.items()]
@@ -255,7 +254,10 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
-        """Run cases for pairs of a test number and unknowns.  Collective.  Returns the answers only on rank 0."""
+        """Run cases for pairs of a test number and unknowns.  Collective.
+
+        Returns pairs of result document and computed data on rank 0, [] elsewhere.
+        """
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

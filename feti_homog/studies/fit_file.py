@@ -65,7 +65,7 @@ class FitReader:
     faults: list[str] = field(default_factory=list)
 
     def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
-        """Read the table of unknowns, and return the unknowns by key."""
+        """Read the table of unknowns, and return the sound unknowns by key.  Faults go to `faults`."""
         if not isinstance(table, dict) or not table:
             self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}
@@ -85,7 +85,7 @@ class FitReader:
     def tests(
         self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
     ) -> tuple[list[Assignment], list[Datum]]:
-        """Read the changes that the tests make to the case document, and the measured values of all tests."""
+        """Read the case changes of all tests, and their measured values.  Faulty tables give fewer or none."""
         if (measured is None) == (tests is None):
             self.faults.append(
                 f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"
@@ -127,7 +127,7 @@ class FitReader:
             self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Read the points of a measured curve from its file."""
+        """Read the points of a measured curve from its file.  Returns [] after a fault."""
         measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []
@@ -153,7 +153,7 @@ class FitReader:
 
 
 def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[toml_files.TomlPath, Any]]:
-    """Yield the paths and values of a nested table; a table that has one of `keys` is a value."""
+    """Yield the paths and values of a nested table.  A table that has one of `keys` is a value."""
     return toml_files.leaves(table, lambda path, value: bool(value.keys() & {*keys}))
 
 

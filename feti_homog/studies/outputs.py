@@ -14,7 +14,7 @@ from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
-MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # of the stresses in a phase
+MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # measures of phase stresses
 CONDUCTIVITIES = tuple(f"k{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 Column = result_json.DescribedColumn
 
@@ -28,9 +28,9 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers in result.json by column name; `numbers` are i and j in Cij of a stiffness (3, 3).
+    """Return the numbers in result.json by column name.
 
-    Components that are noise relative to the others at their point, or along the whole path, are set to zero.
+    Columns Cij of a (3, 3) stiffness have i, j of `numbers`.  Components that are noise at a point or path are 0.
     """
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
@@ -75,7 +75,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
 
 
 def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return the stiffnesses and constants of a result, with mesh errors and bounds."""
+    """Return stiffnesses, anisotropies and constants by column name, with mesh errors and bounds."""
     values = _linear(document, numbers)
     if (stiffness := document.get("effective_stiffness")) is not None:
         C = np.asarray(stiffness)
@@ -95,7 +95,7 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
 
 
 def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffness or conductivity, thermal stress and expansion, or their mesh errors, by column name."""
+    """Return stiffness, conductivity, thermal stress and expansion, or their errors, by column name."""
     values = _entries(section.get("effective_stiffness", ()), numbers)
     values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
     values |= _named(CONDUCTIVITIES, np.ravel(section.get("effective_conductivity", ())).tolist())
@@ -108,15 +108,15 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """Return the entries C11, C12, ... of a stiffness (6, 6), (3, 3) with row indices `numbers`, or empty."""
+    """Return the entries C11, C12, ... of a stiffness, or {}.  `numbers` index the rows of (3, 3)."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
 def _phases(document: Document) -> dict[str, float]:
-    """Return the largest stresses of the phases by column name.
+    """Return the largest stresses and utilisations of the phases by column name.
 
-    Each column is for one load; for angles and paths, it has the largest stress of all states.
+    Each column is for one load; for angles and paths, it has the largest value of all states.
     """
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
     for phase in document.get("phase_stresses", ()):
@@ -219,7 +219,7 @@ OUTPUT_COLUMNS = (
 
 
 def named(word: str) -> list[str]:
-    """Describe entries of result.json and columns of cases.csv with the name `word`, such as C11 for Cij."""
+    """Describe entries of result.json and columns of cases.csv named `word`.  C11 fits the column Cij."""
     entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
     lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
     for column in OUTPUT_COLUMNS:

@@ -39,7 +39,7 @@ NAMES = {
 
 
 def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw the moduli of a sweep over fibre fractions; return the path of moduli.png, if any.  On one rank."""
+    """Draw the moduli of a sweep over fibre fractions.  Returns [path of moduli.png], or [].  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
     with mpl.rc_context(plot_helpers.STYLE):
@@ -94,7 +94,7 @@ def _limit(axes: Axes, is_wide: bool) -> None:
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
-    """Return the bounds of a result by panel: Reuss and Voigt for stiffnesses, tighter bounds for constants."""
+    """Return the bounds of a result by panel.  Stiffnesses have Reuss' and Voigt's, constants tighter bounds."""
     bounds = document.get("bounds") or {}
     pairs: dict[str, Any] = {
         f"C{k + 1}{k + 1}": (bounds["reuss"][k][k], bounds["voigt"][k][k]) for k in (0, 2) if bounds
@@ -138,7 +138,7 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style
 
 
 def draw_fit(path: Path, document: Mapping[str, Any], results: Sequence[Document] = ()) -> Path:
-    """Draw the residuals and fit curves to a file.  Raises FetiHomogError if it cannot be written."""
+    """Draw the residuals and fit curves to `path`; return `path`.  Raises FetiHomogError if it cannot be written."""
     with mpl.rc_context(plot_helpers.STYLE):
         return plot_helpers.save(fit_figure(document, results), path)
 

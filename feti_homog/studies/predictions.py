@@ -97,7 +97,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
-    """Return the result numbers whose scatter matters, by name.
+    """Return, by name, the result numbers that a study of scatter reports.
 
     These are the constants of a stiffness, the entries of a conductivity, the onset and peak of a path, and the numbers
     at the points of other analyses.
@@ -112,7 +112,7 @@ def responses(document: path_curves.Document) -> dict[str, float]:
 
 
 def _values(document: path_curves.Document) -> dict[str, float]:
-    """Return the result numbers by their names in a fit file."""
+    """Return the numbers of a result under the names that a fit file uses."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
@@ -125,7 +125,7 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """Return the computed values (m,) that correspond to the data.  Raises CaseError if a value is missing."""
+    """Return the computed values (m,) at the data.  Raises CaseError if a value, or a curve at a strain, is missing."""
     values = _values(document)
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:
@@ -136,7 +136,7 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return the exact derivatives (m,) of the computed values with respect to an unknown, or None.
+    """Return the exact derivatives (m,) of computed values with respect to an unknown, or None.
 
     Elastic constants do not depend on strengths, nor, in a plane, on expansions.  With a single interface the loads at
     breaks are homogeneous: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not
@@ -163,7 +163,7 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
     if not is_toughness and strengths != [key]:
         return None
-    # S(E; s R) = s S(E / s; R), unless a value depends on the final load.
+    # Stress S, strain E, strength R: S(E; s R) = s S(E / s; R), unless a value depends on the final load.
     relative = (0.5 if is_toughness else 1.0) / float(tables[0][key])
     numbers, derivatives = _values(document), list[float]()
     for datum in data:
@@ -180,10 +180,9 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
-    """Interpolate the stress of a path, and the slope dS/dE, at the strain of a datum.
+    """Interpolate a path's stress S, and its slope dS/dE, at the strain E of a datum.
 
-    Raises:
-        CaseError: another strain component rises along the path, or the path ends below the strain.
+    Raises CaseError if another strain component rises along the path, the path ends below E, or the signs differ.
     """
     curve = path_curves.rising_strain(document)
     strains, stresses = voigt.voigt_names(len(document["path"][0]["stress"]))

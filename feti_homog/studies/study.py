@@ -29,19 +29,19 @@ SILENT = {"fields": False, "pictures": False, "report": False}
 
 @dataclass(frozen=True)
 class Evaluator:
-    """A runner of the cases of a study, in subfolders; groups of `ranks_per_case` ranks work concurrently."""
+    """A runner of the cases of a study, in subfolders.  Groups of `ranks_per_case` ranks work concurrently."""
 
     directory: Path
     comm: Intracomm
     ranks_per_case: int
     retry: bool
     quiet: bool
-    warnings: list[str] = field(default_factory=list)  # about the first cases
+    warnings: list[str] = field(default_factory=list)  # warnings of the first cases
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the sweep cases in the subfolder `name`.  Collective.
 
-        Returns result.json of all cases on rank 0; [] elsewhere.  Raises ConvergenceError if cases failed.
+        Returns result.json of all cases on rank 0; [] elsewhere.  Raises like `case_runs.run_all`.
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
@@ -58,7 +58,7 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """A study of a case document; file names in the document are relative to `folder`."""
+    """A study of a case document.  File names in the document are relative to `folder`."""
 
     document: Mapping[str, Any]
     folder: Path
@@ -95,15 +95,14 @@ class Study(ABC):
         """Return the printed tables of a finished study."""
 
     def digest(self) -> str:
-        """Return the digest of the study: studies with equal cases and inputs have equal digests."""
+        """Return the digest of the study.  Studies with equal cases and inputs have equal digests."""
         cases = [entry.identity for entry in self.first_cases().entries]
         return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 
     def describe(self, comm: Intracomm) -> str:
-        """Return a description of the study and its first case; empty except on rank 0.  Collective.
+        """Return a description of the study and its first case.  Collective.
 
-        Raises:
-            CaseError, MeshError: the cell of the first case is faulty.
+        The text is empty except on rank 0.  Raises CaseError or MeshError if the cell of the first case is faulty.
         """
         heading = mpi_errors.on_root(comm, self.heading)
         return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)
@@ -119,6 +118,7 @@ class Study(ABC):
             CaseError: the folder holds another study or foreign files, another run writes to the folder, or a result
                 lacks a value that the study needs.
             ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
+            FetiHomogError: a file cannot be written.
         """
         size = case_runs.group_size(comm, ranks_per_case)
         mpi_errors.on_root(comm, output_folder.usable, directory)

@@ -13,7 +13,7 @@ from feti_homog.schema import wording
 from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.system.petsc import option_table
 
-MAX_NAMED_CASES = 4  # in one fault
+MAX_NAMED_CASES = 4  # cases that one fault names
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def case_documents(
         for number, (point, document) in enumerate(zip(points, documents, strict=True), start=1):
             inputs, varied = _inputs(point), document
             if realisations is not None and _is_random(document):
-                first = document["cell"].get("seed", 0)  # of realisation 1; a later check reports a faulty seed
+                first = document["cell"].get("seed", 0)  # seed of realisation 1; a later check reports a faulty seed
                 inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
                 varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
             elif realisation > 1:

@@ -43,7 +43,7 @@ class Statistics:
 
 @dataclass(frozen=True, repr=False)
 class SweepTable:
-    """The table of a sweep, with a row for each case; see `pandas.DataFrame({**table.inputs, **table.outputs})`.
+    """The table of a sweep, with a row for each case.  See `pandas.DataFrame({**table.inputs, **table.outputs})`.
 
     Attributes:
         name, stress_unit: as in the sweep.
@@ -90,7 +90,7 @@ class SweepTable:
 
     @property
     def stated(self) -> list[str]:
-        """The names of all outputs except times, memory, checks, and outputs that are zero in all cases."""
+        """The names of outputs, except times, memory, checks, and outputs that are zero in all cases."""
         names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
         return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 
@@ -100,7 +100,7 @@ class SweepTable:
         return [document for document in self.documents if document is not None]
 
     def input_of(self, point: int, name: str) -> Any:
-        """Return the value of an input at a point, or None if the point does not set it."""
+        """Return the value of an input at a point, or None if the point does not set the input."""
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:
@@ -130,9 +130,8 @@ class SweepTable:
     def curves(self, point: int) -> tuple[Float, Float]:
         """Return the stress-strain curves at a point of the sweep, interpolated to common strains.
 
-        Returns:
-            Strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of one
-            leg whose strain rises with the load.  Both are empty if n = 0.
+        Returns strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of
+        one leg on which the strain rises with the load.  Both are empty if n = 0.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
@@ -145,7 +144,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points that differ by one key only; `x` has the ascending values of the key."""
+    """A series of sweep points that differ by one key only.  `x` has the ascending values of the key."""
 
     label: str
     points: list[int]
@@ -155,7 +154,7 @@ class Series:
 def series_over(table: SweepTable, key: str) -> list[Series]:
     """Group the points with finished cases into series over a key.
 
-    A second key with a one-to-one relation to the first does not split a series.
+    A second key that is a function of the first does not split a series.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
     along = list[str]()

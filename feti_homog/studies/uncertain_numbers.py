@@ -45,13 +45,13 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] for a document whose numbers are the means."""
+        """Return the section [uncertainty] for a document that holds the means."""
         pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers from a document; the means remain in the document."""
+    """Extract the uncertain numbers from a document, which keeps their means.  Faults are appended to `faults`."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY
@@ -109,7 +109,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 def _means(
     value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
 ) -> Any:
-    """Replace uncertain numbers in a value by their means; append paths and deviations to `given`."""
+    """Replace uncertain numbers in a value by means.  Appends paths and deviations to `given`, and faults."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
@@ -132,7 +132,7 @@ def _means(
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a path; None for other values, or if the path fits several sections."""
+    """Return the number at a path, or None if there is no number or the path fits several sections."""
     result = _at(document, toml_files.in_lists(path))
     return float(result) if types.is_number(result) else None
 

@@ -35,7 +35,7 @@ Documents = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class ScatterStudy(Study):
-    """A study of the scatter that the uncertain numbers of a case cause."""
+    """A study of the scatter that the uncertain numbers of a case cause.  `means` has their values by dotted key."""
 
     KIND, FILE = "study of scatter", "uncertainty.json"
     ENTRIES = re.compile(r"uncertainty\.json|means|differences")
@@ -53,7 +53,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases one standard deviation below and above the mean of each number."""
+        """Return the cases one standard deviation below and above the mean of each number in `names`."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         return self.cases([{tuple(name.split(".")): end} for name, end in ends], mesh_error=False)
 
@@ -135,7 +135,7 @@ def load(path: Path) -> ScatterStudy:
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
-    """Build a study of scatter from a document whose files are relative to `folder`.  Raises CaseError like `load`."""
+    """Build a study of scatter from a document, with files relative to `folder`.  Raises CaseError like `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
     table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
     if isinstance(table, dict):
@@ -180,7 +180,7 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return a placeholder datum for each number in all results; of a path, only load factors and peak components."""
+    """Return a placeholder datum for each number in all results.  Paths have load factors and peak components only."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone

@@ -1,7 +1,8 @@
 """Evaluate bond laws by independent formulas, and select the law at interface nodes.
 
 A law is a class, here or in `softening`, with the name that `case/bond_laws.py` lists.  Tractions (k, c) have a normal
-and a tangential component, and an axial one in generalized plane strain.
+and a tangential component, and for c = 3 an axial one: t_n, t_t, t_a.  <t_i> is the magnitude of component i, but 0 for
+a normal compression; R_i is its strength, k_i its stiffness.
 """
 
 from abc import ABC, abstractmethod
@@ -24,7 +25,7 @@ NUMBERS = {
 
 
 class BondLaw(ABC):
-    """The law of k bonds; numbers in its `section`, an [[interface]], are scalars or (k,).
+    """The law of k bonds.  Numbers in its `section`, an [[interface]], are scalars or (k,).
 
     If `has_toughness`, a break dissipates the energy `lost`; if `has_tips`, result.json has energies at crack tips.
     """
@@ -42,7 +43,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """Compute utilisations (k,) of the strength under tractions (k, c): 1 at a break, 0 under pure compression."""
+        """Compute utilisations (k,) of the strength: 1 at a break, 0 under pure compression.  Tractions are (k, c)."""
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
@@ -53,16 +54,16 @@ class BondLaw(ABC):
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
-        """Compute the modes psi (k,): 0 in opening, pi/2 in shear; tan^2 psi = G_II / G_I if `has_toughness`."""
+        """Compute the modes psi (k,): 0 opens, pi/2 shears.  With toughness, tan^2 psi = G_II / G_I."""
         pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
-        """Return the fracture energies per area (k,) in modes psi (k,)."""
+        """Return the fracture energies per area (k,) in modes psi (k,).  Laws without toughness have 0."""
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) absorbed as damage rises from `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -84,7 +85,7 @@ class BondLaw(ABC):
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c); inf without a key."""
+        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c).  Missing keys give inf."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -114,7 +115,7 @@ class QuadraticStrength(MaxStrength):
 class SpringEnergy(BondLaw):
     """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
 
-    The spring energies are G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
+    With toughness G_Ic, mode sensitivity lambda, G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
     """
 
     has_toughness: ClassVar[bool] = True
@@ -164,7 +165,7 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
 
 
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """Return the friction coefficients (k,) of debonded faces, or, if `on_damage`, of damaged bonds."""
+    """Return the friction coefficients (k,) of debonded faces or, if `on_damage`, of damaged bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
@@ -190,7 +191,7 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
 
 
 def pairs_of(files: ResultFiles) -> Int:
-    """Return the section numbers (phases, phases) of pairs of phases, -1 where bonds never part."""
+    """Return the section numbers (phases, phases) of pairs of phases.  They are -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:

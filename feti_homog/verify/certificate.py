@@ -27,7 +27,7 @@ DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, M
 
 @dataclass(frozen=True)
 class Certificate:
-    """The findings of all laws that apply; `title` names case, mesh and states.
+    """The findings of all laws that apply.  `title` names case, mesh and states.
 
     `status` has the status and faults that the run reports; `unchecked` maps reasons to numbers that no law reads.
     """
@@ -60,7 +60,7 @@ class Certificate:
 
 
 def verify(directory: Path) -> Certificate:
-    """Check a result folder against all laws; raise a one-line CaseError if a file is unreadable."""
+    """Return a folder's certificate.  Raises CaseError for damaged files, FetiHomogError for missing permissions."""
     # Damaged numbers may demand any memory and time: the limits are five times the needs of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
     seconds = input_files.LEAST_SECONDS + size / input_files.BYTES_A_SECOND
@@ -68,7 +68,7 @@ def verify(directory: Path) -> Certificate:
 
 
 def _verified(directory: Path) -> Certificate:
-    """Check all laws in this process."""
+    """Return the certificate, computed in this process; see `verify`."""
     reason = "numbers are missing, or of another kind or shape"
     try:
         with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
@@ -100,7 +100,7 @@ def checks_of(cell: DiscreteCell) -> list[Finding]:
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
-    """Check mesh, interface and the fields of all states; return the states without mesh fields."""
+    """Check mesh, interface and the fields of all states.  Returns the states without mesh fields."""
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)

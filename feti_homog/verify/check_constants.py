@@ -97,7 +97,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the bounds and the estimate of the effective conductivity by their formulas."""
+    """Check the closed forms of the conductivity, and that the conductivity is within Wiener's bounds."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
     limits = np.array([1 / (share @ (1 / across)), share @ across])
@@ -116,7 +116,7 @@ def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Compute constants by name from C (3, 3) or (6, 6), and expansions from the thermal stress `heat` (6,).
+    """Compute constants by name from the stiffness C (3, 3) or (6, 6) and the thermal stress `heat` (6,).
 
     Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """
@@ -165,7 +165,7 @@ def _isotropic_part(c: Float) -> tuple[float, float]:
 
 
 def _distance(C: Float, other: Float) -> float:
-    """Compute the relative distance ||C - C'|| / ||C|| between tensors C_ijkl."""
+    """Compute the relative distance ||C - C'|| / ||C|| of the tensor C_ijkl from `other`, C'."""
     voigt = VOIGT[len(C)]
     off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
     return float(off / size)

@@ -1,7 +1,6 @@
 """Check that states and result.json have the loads of the case, and that their numbers agree.
 
-A case prescribes the strain or the stress of each of n components; in generalized plane strain the temperature is the
-last strain component.
+A case prescribes the strain or stress of n components; in generalized plane strain the last strain is the temperature.
 """
 
 import json
@@ -31,7 +30,7 @@ FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  #
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A load: `values` (n,) of its components, stresses where `by_stress` (n,) is true, else strains."""
+    """A load: `values` (n,) of its components, stresses where `by_stress` (n,), else strains."""
 
     values: Float
     by_stress: Bool
@@ -83,20 +82,20 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
 
 
 def damaged_at(point: Document) -> int:
-    """Return the number of bonds that break or soften at a point, or in the increment that ends there."""
+    """Return the number of bonds that break or soften at a point, or in its increment."""
     return int(point["broke"]) + int(point.get("softened") or 0)
 
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state with cohesive tractions but without the large `FIELDS`, which are in memory for one state at a time.
+    """A state with cohesive tractions but without large `FIELDS`, which one state at a time has in memory.
 
     Attributes:
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.
         released: (k,) whether a bond is at a tip that breaks by energy release.
         used: (k,) utilisation at bonded nodes, NaN where `released`, else 0.
-        heat: conjugate of the temperature, -<alpha : sigma>.
-        expanding: <alpha : L : strain>.
+        heat: conjugate of the temperature T, -<alpha : sigma> with the expansions alpha.
+        expanding: <alpha : L : strain> with the stiffnesses L.
     """
 
     stored: float
@@ -134,7 +133,7 @@ Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 
 
 def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
-    """Check the loads of points and states against the case; return states with their rows.
+    """Check the loads of points and states against the case.  Returns states with their rows.
 
     A path keeps `[output] states` states; result.json lists their points, which include the first and the last.
     """
@@ -216,7 +215,7 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
 
 
 def rows_of(cell: DiscreteCell) -> Rows:
-    """Return loads and their entries in result.json, for the points of a path or for the states."""
+    """Return loads and their entries in result.json, for path points or for states."""
     document, case = cell.files.document, cell.files.case
     if "path" in document:
         return list(zip(at_points(case, document["path"]), document["path"], strict=True))

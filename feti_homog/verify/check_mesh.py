@@ -105,10 +105,10 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
-    """Compute normals (k, 2) and tributary lengths (k,) from the mesh, and whether they are exact (k,).
+    """Compute normals (k, 2) and tributary lengths (k,) from the mesh.  Flags (k,) tell whether they are exact.
 
-    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or int N ds over its
-    quadratic sides; the normal is the mean of the normals of the sides, weighted by these lengths.
+    Round fibres have radial normals.  The length of a node is half the length of its linear sides, or the integral of
+    its shape function over its quadratic sides; the normal is the mean of side normals, weighted by these lengths.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
@@ -155,7 +155,7 @@ def _tangents(points: Float, frame: Float, places: Float) -> Float:
 
 
 def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that nodes inside debonded arcs have no bond, and that nodes outside start with one.
+    """Check that nodes inside debonded arcs have no bond.  Nodes outside must start with one.
 
     A user's mesh may have debonded curves that the files do not list: nodes outside arcs are then unchecked.
     """
@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Return whether interface nodes (k,) are inside an arc, and whether they are outside all arcs."""
+    """Mark the nodes (k,) inside an arc, and outside all.  `opening` is the default angle of arcs in degrees."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
@@ -197,7 +197,7 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check G = G_I + G_II and the mode psi, and compare the places and lengths of tips with the mesh."""
+    """Check energy release rates G = G_I + G_II and modes psi, and places and lengths of tips."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load"
     G, first, second, psi, length, angle, number, load = (np.array(tips[name]) for name in names)
@@ -217,7 +217,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Compare element errors with a second estimate under unit loads, and the energy error with their sum."""
+    """Compare element errors with a second estimate, and the energy error with their sum."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

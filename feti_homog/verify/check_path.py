@@ -17,10 +17,10 @@ from feti_homog.verify.reading import Status
 
 
 def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of breaks and the fracture energy of a path, and that bonds never heal.
+    """Check the breaks and the fracture energy of a path.  Bonds must never heal.
 
-    A break adds G_c times the broken length, at the mode in the state before the break; if the files lack this state,
-    the energy must lie in its range over all modes.
+    A break adds the toughness times the broken length, at the mode in the state before the break; if the files lack
+    this state, the energy must lie in its range over all modes.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     for number, (point, after) in enumerate(pairwise(points), start=1):
@@ -56,10 +56,7 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
 
 
 def check_strength(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check that no bond exceeds its strength, and that events break the worst bonds.
-
-    Bonds of `overloaded_by_jump` are exempt.
-    """
+    """Check that no bond exceeds its strength, except `overloaded_by_jump`.  Events must break the worst bonds."""
     points, law = cell.files.document["path"], law_at(cell.files)
     # Signs of forces and gaps are certain beyond 20 rtol.  When contact changes at constant load, other quantities then
     # move by 115 rtol (median of 276 changes), and by at most 2100 rtol.
@@ -101,9 +98,9 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
 
 
 def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
-    """Check that tips are the bonds beside broken bonds, with their modes and spring energies.
+    """Check that tips are the bonds beside broken bonds.  Modes and spring energies must fit.
 
-    Returns the state with the utilisation sqrt(G / G_c) of tips that break by energy release, G from the file.
+    Returns the state with the utilisation sqrt(G / toughness) of tips that break by energy release; G is in the file.
     """
     # Tips are sorted by fibre, section and direction.
     node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface

@@ -24,7 +24,7 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants, and their derivatives along one change of all parameters."""
+    """Check the values of all constants, and derivatives along one change of all parameters."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):
@@ -83,7 +83,7 @@ def _parameters(cell: DiscreteCell) -> set[str]:
 
 
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check effective constants and their derivatives `slope` (v, v) along `direction` (parameters,).
+    """Check effective constants and their derivatives `slope`, (v, v) or (6, 7), along `direction` (parameters,).
 
     At fixed contact status, energies are stationary, which gives the derivatives of the diagonal C_kk.  Others need
     fields under other loads with the same status, which are not in the files: there only values are checked.
@@ -158,7 +158,7 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
 
 
 def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
-    """Return the table and key of a parameter, and its index in an array, or () for a scalar."""
+    """Return the table and key of a parameter, and its array index, () for a scalar."""
     section, *keys = name.split(".")
     table: Any = case[section]
     if section == "material" or isinstance(table, list):

@@ -26,7 +26,7 @@ ROUNDED = 1e-4
 
 
 def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check stresses, their averages, Hill's lemma (8) and S33; `fields` follow from the displacements."""
+    """Check stresses, their averages, Hill's lemma (8) and S33.  `fields` follow from the displacements."""
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
@@ -56,12 +56,12 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
-    """Compute forces (k, c) on the fibre along x1, x2 and x3: traction x tributary length."""
+    """Compute forces (k, c) on the fibre, traction x tributary length, along x1, x2 and x3."""
     return cell.in_axes(state.traction * cell.files.interface.length[:, None])
 
 
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check that copies of a node have equal fluctuations, and that forces balance at all nodes.
+    """Check that copies of a node have equal fluctuations, and that forces balance.
 
     Forces on faces balance the traction; on the sides of the cell they balance Sigma n if prescribed, and prescribed
     displacements are E x.  The reaction of the fixed node, u* = 0, contains the rounding of all nodes.
@@ -111,7 +111,7 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
 def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """Check jumps, springs of bonds, contact and friction at interface nodes.
 
-    On debonded faces gap >= 0, normal traction <= 0, gap x traction = 0, and the shear traction is at most mu p.
+    On debonded faces gap >= 0, normal traction <= 0, gap x traction = 0, |shear traction| <= friction x pressure.
     """
     files, at = cell.files, f"{state.name}, interface node {{}}".format
     values, bonded = state.fluctuation[cell.nodes.node], state.status == Status.BONDED
@@ -219,9 +219,10 @@ def _stresses(cell: DiscreteCell, state: State) -> tuple[Float, Float]:
 
 
 def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Float]:
-    """Compute principal, von Mises and hydrostatic stresses (n,), and the utilisation (n,) of a strength.
+    """Compute principal, von Mises and hydrostatic stresses (n,), and the utilisation (n,) of a `strength`.
 
-    s1 = p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3) with q = sqrt(3/2 s : s) and J3 = det s for the deviator s.
+    With hydrostatic p, von Mises' q = sqrt(3/2 s : s) and J3 = det s of the deviator s, the largest principal stress is
+    p + 2/3 q cos(arccos(27 J3 / (2 q^3)) / 3).  The utilisation is absent without a strength.
     """
     p = np.trace(stress, axis1=1, axis2=2) / 3
     deviator = stress - p[:, None, None] * np.eye(3)
@@ -245,8 +246,8 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Compute utilisations 1 / f (n,) of `MODES`, a f^2 + b f = 1; near S11 + S22 = 0 both matrix modes count."""
-    zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))
+    """Compute the utilisations 1 / f (n,) of `MODES`.  The load factor f at failure obeys a f^2 + b f = 1."""
+    zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))  # both matrix modes count near S11 + S22 = 0
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]
     turned = shear - np.linalg.det(stress[:, :2, :2]) / limit["transverse_shear"] ** 2

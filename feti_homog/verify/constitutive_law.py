@@ -19,9 +19,9 @@ Constants = Mapping[str, Any]
 def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """Compute stiffnesses (phases, v, v) and expansions (phases, v) in the axes of the cell.
 
-    In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  Expansions are the strains
-    R_ip R_jq alpha_pq per temperature in generalized plane strain, if all phases have alpha; else 0.  In conduction the
-    temperature is a displacement along x3.  Raises CaseError for a phase of the mesh without a material.
+    In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  Expansions are the strains R_ip
+    R_jq alpha_pq per temperature, R rotating material axes, in generalized plane strain if all phases have alpha; else
+    0.  In conduction the temperature is a displacement along x3.  Raises CaseError for a phase without material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -53,7 +53,7 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
-    """Return for each phase (phases,) whether its quadratic elements have a bubble and a pressure.
+    """Return whether quadratic elements of each phase (phases,) have a bubble and a pressure.
 
     Elements of isotropic phases are mixed, except in plane stress and conduction.  In an isotropic phase one modulus
     and one ratio give all constants, up to rounding.  Raises like `laws`.
@@ -70,9 +70,9 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return 6 eps times the largest ratio of volumetric to least compliance, and times the stiffness contrast."""
+    """Return 6 machine precisions times the largest volumetric / least compliance, and times the stiffness contrast."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
-    compliances = [_compliance(phase) for phase in constants]  # of an incompressible phase, pressures have own limits
+    compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
     sizes, lost = np.abs(stiffnesses).max(axis=(1, 2)), 6 * np.finfo(float).eps
     return float(lost * condition), float(lost * sizes.max() / sizes.min())
@@ -81,8 +81,8 @@ def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float)
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     """Compute matrices (phases, 2, 3) from [S11, S22, S12] to [S33, E33].
 
-    E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33 and E33 is 0.
-    The matrix is NaN if the constants do not determine S33 or E33.  Raises like `laws`.
+    E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with compliances s and stresses S' in material axes; S33 or E33 is 0.
+    The row of the other is NaN if the constants do not determine it.  Raises like `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
     needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],
@@ -100,7 +100,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
 
 
 def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
-    """Return the constants of a phase; raise CaseError if it has no material."""
+    """Return the constants of a phase.  Raises CaseError if it has no material."""
     materials = case["material"]
     constants = materials.get(phase, materials.get(phase.partition(":")[0]))
     if not isinstance(constants, Mapping):
@@ -109,7 +109,7 @@ def phase_constants(case: Mapping[str, Any], phase: str) -> Constants:
 
 
 def _given_stiffness(constants: Constants) -> Float:
-    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6); an empty array (0, 0) without it."""
+    """Return the symmetric part of the constant `stiffness`, (3, 3) or (6, 6).  Without it the result is (0, 0)."""
     stiffness = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((stiffness + stiffness.T) / 2)
 

@@ -20,7 +20,7 @@ ROUNDED_TERMS = 1e-5
 
 
 class Scales(NamedTuple):
-    """The scales of a loaded cell, as if all bonds were intact: strain, stress, displacement E x."""
+    """The scales of a loaded cell with intact bonds: strain, stress, displacement E x."""
 
     strain: float
     stress: float
@@ -64,7 +64,7 @@ class DiscreteCell:
     """The mesh, the materials and the interface of a result.
 
     Attributes:
-        stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain.
+        stiffnesses: (phases, v, v) stiffness of a phase, v = 3, or 6 in generalized plane strain and conduction.
         expansions: (phases, v) strain per temperature, 0 if unknown.
         constituent: (subdomains,) number of the connected part of a phase to which a subdomain belongs.
         inner: (s,) whether a torn side is the inner face of bonds that may break.
@@ -86,7 +86,7 @@ class DiscreteCell:
 
     @classmethod
     def of(cls, files: ResultFiles) -> Self:
-        """Build the cell of a result; raise CaseError if a phase has no material."""
+        """Build the cell of a result.  Raises CaseError if a phase has no material."""
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
@@ -128,12 +128,12 @@ class DiscreteCell:
 
     @property
     def porosity(self) -> float:
-        """Return the area fraction of voids; 0 if every torn side has a partner."""
+        """Return the area fraction of voids.  It is 0 if every torn side has a partner."""
         return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
 
     @cached_property
     def reuss(self) -> Float:
-        """Compute <L^-1>^-1 (v, v), the lower bound of the bonded cell's stiffness."""
+        """Compute <L^-1>^-1 (v, v) of the phase stiffnesses L.  It bounds the bonded cell's stiffness from below."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
     @cached_property
@@ -183,7 +183,10 @@ class DiscreteCell:
         return self.integrals(self.sides.on_side)
 
     def integrals(self, which: Bool) -> Float:
-        """Compute int N_a n ds (nodes, 2), n inwards: sum_b int N_a dN_b/ds x_b on a side, rotated to the normal."""
+        """Compute int N_a n ds (nodes, 2) over the sides `which`.  N_a are shape functions, n normals inwards.
+
+        On a side this is sum_b int N_a dN_b/ds x_b with nodes x_b, rotated to the normal.
+        """
         sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
         nodes = self.sides.nodes[which]
         M = np.array([[-3, -1, 4], [1, 3, -4], [-4, 4, 0]]) / 6 if nodes.shape[1] == 3 else np.array([[-1, 1]] * 2) / 2
@@ -206,12 +209,12 @@ class DiscreteCell:
 
     @cached_property
     def _scales_on_path(self) -> list[Scales]:
-        """Return the scales of all path points if there is friction, which keeps earlier rounding; else []."""
+        """Return the scales of all path points with friction, which keeps earlier rounding; else []."""
         points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
         return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
 
     def scales_of(self, state: State) -> Scales:
-        """Compute the scales of a state; with friction the largest scales on the path up to the state."""
+        """Compute the scales of a state.  With friction they are the largest on the path up to the state."""
         sizes = [self.scales(state.strain, state.temperature), *self._scales_on_path[: state.point + 1]]
         return Scales(*map(max, zip(*sizes, strict=True)))
 
@@ -221,5 +224,5 @@ class DiscreteCell:
 
     @property
     def rounded_energy(self) -> float:
-        """Return a floor (energy per area) for energy scales: a cell without bonds stores only rounding errors."""
+        """Return a floor (energy per area) for energy scales.  A cell without bonds stores only rounding errors."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2

@@ -1,8 +1,8 @@
 """Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
 
-Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
-orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a = r_a, or
-r_a (2 r_a - 1) and 4 r_a r_b in isoparametric elements.
+Displacements have c = 2 components, or 3 in generalized plane strain and conduction; strains and stresses have v = 3 or
+6, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a =
+r_a, or r_a (2 r_a - 1) and 4 r_a r_b in isoparametric elements.
 """
 
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class ElementFields:
     Attributes:
         strain, stress: (m, v) element means.
         strain_size: (m,) size of the terms whose sum is the strain, which bounds the rounding.
-        force: (n, c) int B^T sigma.
+        force: (n, c) nodal forces int B^T sigma for strains B u.
         force_size: (n,) size of the terms whose sum is the force.
         largest_force: largest nodal force of a single element.
         energy: int sigma : eps.
@@ -46,7 +46,7 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh; quadratic elements of `mixed` phases have a bubble and a pressure."""
+    """The elements of a mesh.  Quadratic elements of `mixed` phases have a bubble and a pressure."""
 
     def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu of mixed phases, and largest mu / least mu of mixed phases; or 0."""
+        """Return the largest lambda / mu and the largest (mu of any phase) / mu over mixed phases, or (0, 0)."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -178,12 +178,11 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
 def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
     """Compute du_i/dx_d (e, q, 2, 2) of the bubbles, and the pressures (e, q).
 
-    Arguments are the gradients dN_a/dx (e, q, 6, 2), the weights (e, q), the elastic strains (e, q, v) without bubbles,
-    and lambda and mu (e, 2).
+    Arguments: dN_a/dx (e, q, 6, 2), weights (e, q), elastic strains (e, q, v) without bubbles, lambda and mu (e, 2).
     """
     (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
-    bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients
+    bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients of the bubble
     square = np.einsum("eq,eqd,eqk->edk", weights, bubble, bubble)
     moment = np.einsum("eq,qm,eqd->emd", weights, places, bubble)
     matrix, right = np.zeros((len(weights), 5, 5)), np.zeros((len(weights), 5, 1))

@@ -43,7 +43,7 @@ Place = str | Callable[[int], str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A law, the limit of its relative violation, the largest violation and the place where it occurs."""
+    """A law with its limit, the largest relative violation, and the place of the violation."""
 
     name: str
     description: str
@@ -65,7 +65,7 @@ class Finding:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Return the finding as a table of JSON values; an infinite violation is null."""
+        """Return the finding as a table of JSON values.  An infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
         law = {"law": self.name, "words": self.description, "limit": self.limit}
         return law | {"violation": violation, "where": self.where, "holds": self.holds}
@@ -108,18 +108,18 @@ class Findings:
 
 
 def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
-    """Compute |errors| / scale; where the scale is 0, the result is 0 for an error of 0, else inf."""
+    """Compute |errors| / scale.  Where the scale is 0, the result is 0 for an error of 0, else inf."""
     errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
     return np.asarray(np.divide(errors, scale, out=np.where(errors == 0.0, 0.0, np.inf), where=scale > 0))
 
 
 def solver_limit(rtol: float) -> float:
-    """Return min(1000 rtol, 1e-4), the limit of laws that hold to the accuracy of the dual solver."""
+    """Return min(1000 rtol, 1e-4), the limit of laws that hold to the solver's accuracy."""
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
-    """List the laws with their limits and without violations, for a tolerance `rtol` of the dual problems.
+    """List the laws with their limits for a tolerance `rtol` of the dual problems, without violations.
 
     `phases` has the two numbers of `Elements.contrasts`, then the two of `constitutive_law.rounding`.
     """
@@ -202,7 +202,7 @@ COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "disp
 
 
 class Section(dict[str, Any]):
-    """A table of result.json that records which entries the laws have read; ATOMS count as one entry."""
+    """A table of result.json that records the entries that laws read.  ATOMS count as one entry."""
 
     def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:
         super().__init__(content)
@@ -224,15 +224,15 @@ class Section(dict[str, Any]):
         return super().__getitem__(key)
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return an entry, which then counts as read; return the default for a missing entry."""
+        """Return an entry, which then counts as read, or `default` for a missing entry."""
         return self[key] if key in self else default  # noqa: SIM401, because `super().get` would not count it
 
     def hint(self, key: str, default: Any = None) -> Any:
-        """Return an entry without counting it as read: a law uses the value but does not check it."""
+        """Return an entry without counting it as read.  A law uses the value but does not check it."""
         return super().get(key, default)
 
     def leaves_open(self, *keys: str) -> None:
-        """Count entries as unread from now on: laws use their values but do not determine them."""
+        """Count entries as unread from now on.  Laws use their values but do not determine them."""
         self.unread |= dict.fromkeys((self._prefix + key for key in keys), True)
 
 

@@ -33,7 +33,7 @@ from feti_homog.verify.reading import Status
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """The strains and stresses (n,), stored energy per area and prescribed load at a point of a path.
+    """The strains and stresses (n,), stored energy per area and load at a path point.
 
     Strains and stresses end with the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
     """
@@ -47,7 +47,7 @@ class PointNumbers:
 
     @classmethod
     def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
-        """Collect the numbers of a point, from its state if the files have one.
+        """Collect the numbers of a point, from its `state` if there is one.
 
         Without a state, the stored energy is E.Sigma / 2 by Hill's lemma (8); the conjugate of a temperature follows
         from the stored energy in the file.
@@ -79,7 +79,7 @@ class PointNumbers:
 
 
 def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check stored energies and the strain-controlled dissipation at all points."""
+    """Check the strain-controlled dissipation at all points, and stored energies without temperature and friction."""
     points = cell.files.document["path"]
     # The stored energy is E.Sigma / 2 without temperature and friction.
     with_fields = {state.point for state in states}
@@ -128,7 +128,7 @@ def check_heat(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers, state: StateNumbers) -> None:
-    """Check the friction heat of an increment without breaks: its final tractions times the changes of slip.
+    """Check the friction heat of an increment without breaks: final tractions times changes of slip.
 
     The error is relative to these tractions times the slips before and after the increment, plus the rounding of the
     energies.  The work in the result is no evidence: runs sum it from energies and heat.  Other steps are not checked.
@@ -149,7 +149,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Bound the potential of a load from below and above by (P), with another state of the same bonds."""
+    """Bound the potential of a load by (P) and a state of the same bonds.  Bounds that do not apply are infinite."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
@@ -161,7 +161,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
 
 
 def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
-    """Maximize t power - t^2 energy over t >= 0 with load = t unit; -inf if no t fits or the power is NaN."""
+    """Maximize t power - t^2 energy over t >= 0 with load = t unit.  Returns -inf if no t fits, or for NaN."""
     if not (load.any() or unit.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:
@@ -174,7 +174,7 @@ def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
 
 
 def _work(prescribed: Float, conjugate: Float) -> float:
-    """Compute prescribed.conjugate without terms where `prescribed` is 0: there `conjugate` may be NaN."""
+    """Compute prescribed.conjugate without terms where `prescribed` is 0.  There `conjugate` may be NaN."""
     return float(prescribed[prescribed != 0.0] @ conjugate[prescribed != 0.0])
 
 

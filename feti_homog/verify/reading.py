@@ -22,7 +22,7 @@ from feti_homog.verify.findings import Points, Section
 JSON, FIELDS, SCHEMA = "result.json", "result.h5", 1
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
 CHECKSUM_BLOCK = 1 << 26  # bytes
-COATING = "coating"  # phase
+COATING = "coating"  # name of the phase
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: bodies (f,), centres (f, 2) and radii (f,), NaN where they are undefined.
+    """The f fibres: bodies (f,), centres (f, 2) and radii (f,), NaN where undefined.
 
     `strength` (f,) is the strength of bonds / the strength in the case.
     """
@@ -111,7 +111,7 @@ class State:
 
     @property
     def along(self) -> float:
-        """Return E33; 0 except in generalized plane strain."""
+        """Return E33 in generalized plane strain, the gradient along x3 in conduction, and 0 in plane states."""
         return float(self.strain[2]) if len(self.strain) > 3 else 0.0
 
 
@@ -124,7 +124,7 @@ def gradient(strain: Float) -> Float:
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """An open result folder; `size` (2,) is the size of the cell, `altered` names files changed since the run."""
+    """An open result folder.  `size` (2,) is the size of the cell, `altered` names files changed since the run."""
 
     document: Section
     size: Float
@@ -163,14 +163,14 @@ class ResultFiles:
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """Return the sections [[interface]], with conductances as axial stiffnesses; empty if all bonds are perfect."""
+        """Return the sections [[interface]], [] for perfect bonds.  Conductances become axial stiffnesses."""
         sections: Any = self.case.get("interface", [])
         sections = sections if isinstance(sections, list) else [sections]
         return [{"axial_stiffness": row["conductance"], **row} if "conductance" in row else row for row in sections]
 
     @property
     def points(self) -> Points:
-        """Return the points of a path or of angles, or the single load."""
+        """Return the points of a path or of angles, the single load, or [] for other analyses."""
         document = self.document
         points: Points = document.get("path") or document.get("angle") or []
         return points or ([document["load"]] if "load" in document else [])
@@ -195,7 +195,7 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Return the names of files changed since the run; raise CaseError if a file is unreadable."""
+    """Return the names of files changed since the run.  Raises CaseError if a file is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Open the results in a folder; raise a one-line CaseError if a file is unreadable."""
+    """Context manager: open the results in a folder.  Raises CaseError, of one line, for an unreadable file."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {
@@ -236,7 +236,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    """Read result.json; raise CaseError if it is unreadable or has another schema."""
+    """Read result.json.  Raises CaseError if it is damaged or has another schema, and like `input_files.unreadable`."""
     try:
         document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:

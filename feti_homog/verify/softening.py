@@ -1,7 +1,7 @@
 """Evaluate cohesive laws t(delta) of the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
-K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.  Damage grows in steps, the
-teeth, between discrete levels.  A branch gives t / peak as a function of u = (delta - delta_0) / stretch.
+K is the stiffness of a mode, with opening delta_n, slip delta_s: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t
+delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
 """
 
 from abc import abstractmethod
@@ -46,7 +46,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area (k,) absorbed as damage rises from `before` to `after` (k,), in modes psi (k,)."""
+        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
         return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -69,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,): openings have a constant ratio, in the pure mode of larger end / delta_0."""
+        """Compute damage levels (n + 1,) of openings in a constant ratio, in the mode of the larger end / delta_0."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
@@ -173,9 +173,9 @@ class ExponentialLaw(Cohesive):
     last = -float(np.log(TAIL))
 
     def branch(self, u: Float) -> Float:
-        """Compute exp(-u)."""
+        """Compute traction / peak = exp(-u)."""
         return np.asarray(np.exp(-u))
 
     def under(self, u: Float) -> Float:
-        """Compute 1 - exp(-u)."""
+        """Compute the area 1 - exp(-u) under the branch."""
         return np.asarray(1.0 - np.exp(-u))

@@ -19,7 +19,7 @@ SAME_PLACE = 1e-2
 
 @dataclass(frozen=True)
 class TornSides:
-    """The s torn sides, with a single element in their subdomain: on cuts, interfaces and the cell boundary.
+    """The s torn sides, on cuts, interfaces and the cell boundary.  Each has one element in its subdomain.
 
     Attributes:
         element: (s,) element of a side.
@@ -45,7 +45,7 @@ class TornSides:
 
 @dataclass(frozen=True)
 class TornNodes:
-    """The b nodes on torn sides: (b,) numbers in the mesh, places on the torus, subdomains and phases."""
+    """The b nodes on torn sides: numbers in the mesh, places on the torus, subdomains and phases, all (b,)."""
 
     node: Int
     place: Int
@@ -59,7 +59,7 @@ class TornNodes:
 
 
 def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornNodes, float]:
-    """Find torn sides and nodes on the torus of a cell with `size` (2,); return them and the matching radius."""
+    """Find torn sides and nodes on the torus of a cell with `size` (2,).  Returns them and the matching radius."""
     m, columns = mesh.triangles.shape
     local = [(side, (side + 1) % 3, 3 + side)[: columns // 3 + 1] for side in range(3)]
     sides_of_elements = mesh.triangles[:, local].reshape(3 * m, -1)
@@ -87,7 +87,7 @@ def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornN
 
 
 def wrapped(points: Float, shift: Float | None) -> Float:
-    """Shift points (k, 2) by periods to coordinates in [0, shift)."""
+    """Shift points (k, 2) by periods to coordinates in [0, shift).  Without a shift they stay."""
     if shift is None:
         return points
     inside = points - np.floor(points / shift) * shift
@@ -123,7 +123,7 @@ def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
 
 
 def bodies(mesh: Mesh, phases: tuple[str, ...], sides: TornSides) -> tuple[Int, Int]:
-    """Return the part (subdomains,) of each subdomain and the order (parts,) of parts from the matrix inwards.
+    """Return the part (subdomains,) of each subdomain and the order (parts,) from the matrix inwards.
 
     A part is a connected region of one phase on the torus.  The order is by the number of parts between a part and the
     matrix, then coatings before other phases, then by body labels.

@@ -39,7 +39,7 @@ out: far above the noise of irregular meshes in symmetric cells (1e-6), below th
 
 @dataclass(frozen=True, eq=False)
 class EffectiveMaterial:
-    """A linear elastic material in card axes: 1 along the fibre, 2 and 3 along x1 and x2 of the cell.
+    """A linear elastic material in card axes, with axis 1 along the fibre.
 
     Attributes:
         name: case name.
@@ -47,7 +47,7 @@ class EffectiveMaterial:
         stress_unit: the case's label, empty if it has none.
         symmetry: in words.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
-            positive definite.
+            positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.
         errors: estimated mesh errors, by name of constant or expansion.
     """
@@ -76,7 +76,8 @@ class EffectiveMaterial:
     def constants(self) -> dict[str, float]:
         """Return the engineering constants by name, in the order of an Abaqus card.
 
-        E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij.
+        With the compliance S: E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i), G_ij = 1/(shear
+        entry).
         """
         S = self.compliance
         return {
@@ -89,7 +90,7 @@ class EffectiveMaterial:
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """Return the material of a result with stiffness and expansion as computed.
 
-    The material is orthotropic if all other entries are negligible.
+    Shears are uncoupled, and the material orthotropic, if their couplings and expansions are within NEGLIGIBLE.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
@@ -118,9 +119,8 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     """Return the nearest transversely isotropic material of a result.
 
-    Raises:
-        CaseError: the result has no such material, or did not converge.
-        KeyError, TypeError, ValueError: the result is damaged.
+    Raises CaseError if the result has no such material, or did not converge; KeyError, TypeError or ValueError if the
+    result is damaged.
     """
     _stiffness(document)
     computed = document["transversely_isotropic"]
@@ -152,7 +152,7 @@ def _material(
 
 
 def require_done(document: Document) -> None:
-    """Raise CaseError, with the first fault, if a result did not converge or has other faults."""
+    """Raise CaseError for a result that did not converge or has other faults; quote its first fault."""
     if document["status"] != "done":
         faults = document.get("faults") or ["it was not finished"]
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
@@ -160,7 +160,7 @@ def require_done(document: Document) -> None:
 
 
 def _stiffness(document: Document) -> Float:
-    """Return the symmetric positive definite stiffness (6, 6) in cell axes."""
+    """Return the symmetric positive definite stiffness (6, 6) in cell axes.  Raises CaseError if a result has none."""
     require_done(document)
     analysis = document["case"]["analysis"]
     if document.get("effective_stiffness") is None:
@@ -217,9 +217,9 @@ def number(value: float, width: int = 24) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert a name to letters, digits and single underscores.
+    """Convert the first 60 characters of a name to letters, digits and single underscores.
 
-    The identifier begins with a letter and has at most 60 characters.
+    The prefix `material_` comes before an identifier that does not begin with a letter.
     """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
@@ -228,7 +228,7 @@ def identifier(name: str) -> str:
 def conductor_card(document: Document, form: str, symmetry: str) -> str:
     """Return the card of a conductivity as computed, or of the nearest "transversely isotropic" conductivity.
 
-    Couplings up to `NEGLIGIBLE` sqrt(k_ii k_jj) are left out.
+    Couplings are left out: of the nearest conductivity all, as computed up to `NEGLIGIBLE` sqrt(k_ii k_jj).
 
     Raises:
         CaseError: the result did not converge, has larger couplings, or the format has no conductivity.

@@ -198,14 +198,12 @@ def card_of(document: Document, form: str, symmetry: str = "orthotropic") -> str
 def card(directory: Path, form: str, symmetry: str) -> str:
     """Return the material card of a result folder.
 
-    Args:
-        directory: the result folder.
-        form: the card format, a key of `FORMATS`.
-        symmetry: the material symmetry, a key of `SYMMETRIES`.
+    `form` is a key of `FORMATS`, `symmetry` a key of `SYMMETRIES`.
 
     Raises:
         CaseError: the format or the result does not exist, or the result is damaged or has no material that the
-            format can carry; the message has one line.
+            format can carry.
+        FetiHomogError: result.json has no read permission.
     """
     if form not in FORMATS:
         raise CaseError(f"--format {form}".rstrip() + f": expected one of {', '.join(FORMATS)}")

@@ -36,7 +36,7 @@ FLAT = 0.02  # standard deviation in each phase / largest stress, below which co
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw the materials of the cell with the fibre numbers.
 
-    The figure also has the strength factors of the fibres if the factors differ.
+    The figure also has the strength factors of the fibres if a factor is not 1.
     """
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
@@ -61,14 +61,14 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
 
 
 def _cyclic_colours(count: int) -> Array:
-    """Return colours (count, 4) around the colour circle, from blue on; none of them is grey."""
+    """Return colours (count, 4) around the colour circle, from blue on.  None of them is grey."""
     return np.asarray(mpl.colormaps["hsv"]((0.58 + TURN * np.arange(count)) % 1.0))
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the subdomains, each in its own colour or, on several ranks, in the colour of its rank.
+    """Draw the subdomains, coloured one by one or, on several ranks, by rank.
 
-    A subdomain across materials counts once for each body.  Beyond `IN_LEGEND` colours, they are pale, with numbers.
+    A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
     drawn = cell.drawn
     ranks = np.unique(drawn.rank)
@@ -98,10 +98,10 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 
 
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
-    """Draw the cell coloured by its mesh error density; return None without error estimates.
+    """Draw the cell coloured by its mesh error density.  Returns None without finite errors.
 
-    The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips
-    lie above the colour range: otherwise the rest of the cell would have one colour.
+    The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips lie
+    above the colour range: otherwise the rest of the cell would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
@@ -131,7 +131,7 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
 
 
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array, look: plot_helpers.Look) -> tuple[Figure, Axes]:
-    """Draw the cell with triangle colours (q, 4) and body outlines."""
+    """Draw the cell with triangle colours (q, 4) and body outlines.  Returns figure and axes."""
     picture, axes = drawn_cell.figure_of(cell.file.attrs, look)
     points, triangles = cell.drawn.points, cell.drawn.triangles
     # Each triangle has its own nodes, for sharp colours; antialiasing would leave seams.
@@ -151,7 +151,7 @@ def _title(attributes: Any, text: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write the fibre numbers onto the drawn fibres.
+    """Write the fibre numbers onto the drawn fibres.  More than 2000 fibres get none.
 
     The cell sides may cut a round fibre; every part of the fibre then gets the number.
 
@@ -251,7 +251,7 @@ def is_axial(state: Any) -> bool:
 
 
 def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
-    """Draw about twelve contour lines of the axial displacement; return the displacement step."""
+    """Draw about twelve contour lines of axial displacement or temperature.  Returns the step between lines."""
     displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
     levels = MaxNLocator(12, steps=(1, 2, 5, 10)).tick_values(displacement.min(), displacement.max())
     x, y = drawn.points.T

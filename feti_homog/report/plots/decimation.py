@@ -17,7 +17,7 @@ from feti_homog.typing import Array
 LEAST_AREA = 0.5  # deformed / undeformed triangle area: a triangle turns over at zero
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
 SAME_PLACE = 1e-6  # largest distance of coincident nodes / size of the cell
-QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
+QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # the quarters of a six-node triangle
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Number the node positions in each body (p,): torn nodes at the same position have the same number."""
+        """Number the node positions in each body (p,).  Torn nodes at the same position have the same number."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
@@ -84,7 +84,7 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
 
 
 def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
-    """Return the rows (p, 2) of a nodal table at the drawn nodes."""
+    """Return the rows (p, ...) of a nodal table at the drawn nodes."""
     return _picked(table, drawn.nodes, drawn.block)
 
 
@@ -122,7 +122,7 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
-    """Apply `function` to the blocks of a table, with rows in groups (g, group, columns); join the results."""
+    """Apply `function` to the blocks of a table, and join the results.  Blocks have shape (g, group, columns)."""
     step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
@@ -140,7 +140,8 @@ def _picked(table: Any, numbers: Array, block: int) -> Array:
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     """Return the displacements u of a state at the drawn nodes (p, 2).
 
-    The solution leaves the translation open; here u* = u - E x has zero mean over the drawn triangles.
+    The solution leaves the translation open; here u* = u - E x has zero mean over the drawn triangles, with the
+    macroscopic strain E and the positions x.
     """
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt.voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))

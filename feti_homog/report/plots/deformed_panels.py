@@ -43,7 +43,7 @@ class DeformedCell(drawn_cell.DrawnCell):
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Choose one stress component and one colour range for all given states.
+        """Create the cell with one stress component and one colour range for all given states.
 
         The case may name the component; by default all states determine the component, on a path the peak.
         """
@@ -73,9 +73,9 @@ class DeformedCell(drawn_cell.DrawnCell):
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell in a state, with its nodes at `moved` (p, 2); return the coloured triangles.
+        """Draw the cell in a state, with its nodes at `moved` (p, 2).
 
-        The end of a path has its own colour range if its stresses are more than twice the earlier stresses.
+        Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         attributes = state.attrs
@@ -99,7 +99,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of the shapes beside the axes; if there are two bars, both have titles."""
+        """Draw the colour bar of the shapes beside the axes.  If there are two bars, both have titles."""
         is_common = shapes.norm is self.colours[0]
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")
@@ -120,13 +120,12 @@ def draw_state(
 
     The state has index `number` in `out`/result.h5.  Call on one rank.  Returns the caption.
 
-    `stress` is "S11", "S22" or "S12", by default along the largest strain; `scale` multiplies displacements.  Colours
-    go from minus `most` to `most`, so that several pictures can have the same scale; by default they suit the state.
+    `stress` is a component such as "S11", by default along the largest strain; `scale` multiplies displacements.
+    Colours go from minus `most` to `most`, so that several pictures can have the same scale; by default they suit the
+    state.
 
-    `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
-
-    Raises:
-        FetiHomogError: result.h5 cannot be read, or has no such state.
+    `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.  Raises FetiHomogError if
+    result.h5 cannot be read, or has no such state.
     """
     field_guard.require_own(path := Path(out) / field_file.NAME, number)
     try:
@@ -147,7 +146,7 @@ def draw_state(
 
 
 def shown_scale(file: Any, document: Document) -> float:
-    """Return the displacement factor for all pictures of an angle or a path.
+    """Return the displacement factor for all pictures of an `angle` or `path` analysis.
 
     The case may give the factor; by default the largest displacement and opening are visible and no triangle turns
     over, but the factor is at least 1 under a load of the case.
@@ -232,7 +231,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 
 def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
-    """Write the states along a path as an animation.  All frames have the layout for the last state."""
+    """Write the states along a path to `path` as an animated GIF.  All frames have the layout of the last state."""
     numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]

@@ -23,7 +23,7 @@ from feti_homog.typing import Array, Document
 
 
 class NodeState(IntEnum):
-    """The state of an interface node: the status in result.h5, or DAMAGED for a damaged bond that holds."""
+    """The state of an interface node: status in result.h5, or DAMAGED for unbroken damaged bonds."""
 
     BONDED = 0
     CLOSED = 1
@@ -42,7 +42,7 @@ ORDER = np.array(list(STATE_NAMES))
 
 @dataclass(frozen=True)
 class InterfaceEdges:
-    """The drawn edges on both faces of the fibre-matrix interfaces, with the interface nodes at their ends."""
+    """The drawn edges on both faces of the interfaces, with interface nodes at their ends."""
 
     edges: Array  # (e, 2) drawn nodes
     nodes: Array  # (e, 2) rows of /interface
@@ -64,13 +64,14 @@ class InterfaceEdges:
         return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
 
     def state(self, status: Array) -> Array:
-        """Return the edge states (e,) for node states (k,): open if an end is open, else in contact or damaged."""
+        """Return edge states (e,) for node states `status` (k,): of the two ends, the state later in STATE_NAMES."""
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
-        """Draw the interface edges in a state, with nodes at `points` (p, 2); return legend lines for the drawn states.
+        """Draw the interface edges in a state, with nodes at `points` (p, 2).
 
-        Damaged edges that hold are coloured by the damage at their ends, in tenths.
+        Returns legend lines for the drawn states.  Damaged edges have the colour of the damage at their ends, in
+        tenths.
         """
         states = self.state(states_of_nodes(state))
         damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0) if "damage" in state else np.zeros(len(states))
@@ -99,14 +100,14 @@ class DrawnCell:
 
     @classmethod
     def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
-        """Read the cell of an open result.h5, coarsened to about `limit` triangles at most."""
+        """Read the cell of an open result.h5, coarsened to `limit` triangles where the nesting allows."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
 
 
 def states_of_nodes(state: Any) -> Array:
-    """Return the interface node states (k,) in a state of result.h5, with DAMAGED for damaged bonds that hold."""
+    """Return the interface node states (k,) in a state of result.h5.  Damaged bonds that hold are DAMAGED."""
     status = state["status"][:]
     damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
     return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
@@ -185,7 +186,7 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return the visible strains and the temperature of a state as formulas.
+        """Return the visible strains and the temperature of a state as formulas, or ["no strain"].
 
         A path with many strains shows the leading strain and its stress; a load shows the components in its section.
         """

@@ -64,7 +64,10 @@ def plot(
 def of_fields(
     directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | str | None = None
 ) -> list[Path]:
-    """Draw the pictures that show the mesh or a field, or only one state; return the picture paths."""
+    """Draw the pictures of mesh and fields, or of the `chosen` state alone.
+
+    Returns the picture paths.  Raises CaseError if the result has no such state or component.
+    """
     cell, report = drawn_cell.DrawnCell.of(file), reported(document)
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")

@@ -14,7 +14,7 @@ from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Array, Document
 
-MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # of landmarks
+MARKS = {"first_softening_": "v", "first_break_": "D", "": "*"}  # markers of landmarks
 LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}  # background of numbers on curves
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 ROUND = (1, 2, 5, 10)  # steps of ticks
@@ -111,7 +111,7 @@ def _stress_curves(
 
 
 def _line_style(values: Array, drawn: list[Array]) -> str:
-    """Return dashes if a curve (n,) mostly covers a `drawn` curve, else a solid line; append it to `drawn`."""
+    """Return dashes for a curve (n,) that mostly covers a `drawn` curve, else a solid line.  Extends `drawn`."""
     tolerance = 0.01 * max(np.abs([values, *drawn]).max(), 1e-300)
     covers = any(np.mean(np.abs(values - other) <= tolerance) > 0.5 for other in drawn)
     drawn.append(values)
@@ -119,7 +119,7 @@ def _line_style(values: Array, drawn: list[Array]) -> str:
 
 
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
-    """Draw counts of bonded, open and closed nodes: thin at all equilibria, thick at a rising load."""
+    """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
     points, rising, drawn = document["path"], _records(document), list[Array]()
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
@@ -137,7 +137,7 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
 
 
 def _records(document: Document) -> Array | None:
-    """Return the numbers of the points that a rising load reaches on a proportional path, else None."""
+    """Return the points that a rising load reaches on a proportional path; None for other paths."""
     if not path_curves.is_proportional(document):
         return None
     load = np.array([point["load_factor"] for point in document["path"]])
@@ -145,7 +145,7 @@ def _records(document: Document) -> Array | None:
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Label points on a curve (points, 2) with `numbers` and pointers, each where there is most room."""
+    """Label the points `numbers` on a curve (points, 2) by pointers.  Labels lie where there is most room."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     style |= {"textcoords": "offset points", "arrowprops": pointer}
@@ -233,7 +233,7 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
             sums = [np.array(column[:-1]) + column[1:] for column in (values, [point["stored"] for point in points])]
             bend *= (sums[0] / np.maximum(sums[1], np.finfo(float).tiny))[:, None]
         between = values[:-1, None] + rise * steps - bend * steps * (1.0 - steps)
-        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # between distant points
+        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # points between distant loads
         return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
     values, load = values[rising], load[rising]
     start = np.append(0.0, load[:-1] / load[1:])

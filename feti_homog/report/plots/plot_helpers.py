@@ -46,7 +46,7 @@ OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either
 INK = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 # Colours of macroscopic stresses: a component has the same colour in all pictures.
 STRESS_INK = dict(zip(("S11", "S22", "S12", "S33", "S23", "S13"), INK, strict=False))
-ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # of the stiffness
+ENTRY_INK = dict(zip(("C11", "C22", "C33", "C12", "C44", "C55", "C66"), INK, strict=True))  # colours of entries
 MESH = "0.4"  # colour of element sides
 NARROW = 5.0  # inches; panels of narrower pictures are stacked, and have short labels
 LEAST_TEXT = 7.5  # points; journals take no smaller text
@@ -73,7 +73,7 @@ class Look:
 
     @property
     def style(self) -> dict[str, Any]:
-        """Return the style, with smaller text in a small picture."""
+        """Return Matplotlib's style parameters, with smaller text in a small picture."""
         width = 18.0 if self.size is None else self.size[0]
         return STYLE | {"font.size": max(10.0 * min(width / 18.0, 1.0), LEAST_TEXT)}
 
@@ -87,7 +87,10 @@ PLAIN = Look()
 
 
 def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
-    """Write the figure, by default without white margins.  Raises FetiHomogError if it cannot be written."""
+    """Write the figure in the format of `look`; return the file path.
+
+    By default pictures have no white margins.  Raises FetiHomogError if the file cannot be written.
+    """
     if look.title is not None:
         figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
     for text in [*figure.texts, *(axes.title for axes in figure.axes)]:
@@ -102,21 +105,21 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
 
 @contextmanager
 def missing_letters_as_boxes() -> Iterator[None]:
-    """Silence, in a `with` block, the warnings about letters that the font lacks; Matplotlib draws boxes instead."""
+    """Context manager: silence warnings about letters that the font lacks.  Matplotlib draws boxes instead."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
         yield
 
 
 def finish_curves(*panels: Axes) -> None:
-    """Add faint grids behind the curves of a figure, and a legend of the first panel below."""
+    """Add faint grids to the panels of a figure, and the first panel's legend below them."""
     for axes in panels:
         faint_grid(axes)
     legend_below(panels[0].figure, panels[0].get_legend_handles_labels()[0])
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
-    """Add a legend below the axes, in as many columns as fit into the figure, at most `limit`."""
+    """Add a legend below the axes.  It has as many columns as fit into the figure, at most `limit`."""
     for columns in range(min(len(handles), limit), 0, -1):
         legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
@@ -131,7 +134,7 @@ def faint_grid(axes: Axes) -> None:
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
-    """Draw triangles in smooth colours for the nodal values (p,).  The nodes are at `points` (p, 2)."""
+    """Draw triangles in smooth colours by nodal values (p,) at `points` (p, 2).  Returns the triangles."""
     mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
@@ -166,10 +169,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 
     Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
     zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
-    default: meshes are fine at tips, where stresses are singular.
-
-    Returns:
-        colour range, colour map, and the ends of the range beyond which values lie.
+    default: meshes are fine at tips, where stresses are singular.  Returns range, map, and ends like `value_range`.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
@@ -189,10 +189,7 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
     """Choose the colour range of a field.
 
     At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
-    one colour.
-
-    Returns:
-        colour range, and the ends of the range beyond which values lie.
+    one colour.  Returns the range, and the ends beyond which values lie: "min", "max", "both" or "neither".
     """
     low, high = float(values.min()), float(values.max())
     if high - low <= 0.01 * max(abs(low), abs(high), 1e-300):
@@ -217,9 +214,10 @@ def _outside(values: Array, bottom: float, top: float) -> str:
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
-    """Choose a displacement factor: 1, 2 or 5 times a power of ten, at most `largest`.
+    """Choose a displacement factor: 1, 2 or 5 times a power of ten.
 
-    The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
+    The factor is at most `largest`, and 1 without displacement.  The largest displacement is drawn as about a tenth of
+    the cell size, or up to a quarter to show a narrow opening.
     """
     if displacement == 0.0:
         return 1.0
@@ -245,17 +243,17 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress at the drawn nodes (p,): the mean over triangles that share the node and the body."""
+    """Return a stress at the drawn nodes (p,), averaged over adjacent triangles of the same body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
-    if component == VON_MISES:  # of the mean stresses of elements, as in `viewed_states`
+    if component == VON_MISES:  # by element means, as in `viewed_states`
         shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
         table = voigt.spatial_von_mises(state["stress"][:], table[:], shears)
     return node_means(triangle_means(table, column, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:
-    """Describe every interface law in one line, with its phases if the case has several laws."""
+    """Describe every interface law in one line.  With several laws, the lines begin with the phases."""
     bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
@@ -275,7 +273,7 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
 
 
 def plain(text: str) -> str:
-    """Escape control characters of a user's text, and dollar signs, which mark formulas of Matplotlib."""
+    """Escape control characters of a user's text, and dollar signs, which mark Matplotlib's formulas."""
     return escaped(text, "\n").replace("$", r"\$")
 
 
@@ -284,7 +282,7 @@ def unit_label(label: str) -> str:
 
 
 def stress_label(label: str) -> str:
-    """Return the stress unit for an axis; without a label in the case, the unit of the moduli."""
+    """Return the stress unit for an axis.  Without a `label` it is the unit of the moduli."""
     return unit_label(label) or "(unit of the moduli)"
 
 

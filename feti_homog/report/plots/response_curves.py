@@ -112,7 +112,7 @@ def loads(points: Sequence[Document]) -> Array:
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """Return the modes (n,) in degrees, 0 opening, 90 shear: psi, or from traction / strength; NaN without onset."""
+    """Return the modes psi (n,) of breaks in degrees: 0 opens, 90 shears.  They are NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (
@@ -123,7 +123,7 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Limit the axes to zero and the loads (n, 2) near the median; return a note on hidden loads."""
+    """Choose axis limits around zero and the loads (n, 2) near the median.  Returns notes on hidden loads, or []."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
     far = size > 6.0 * usual  # directions that hardly open a bond
@@ -138,7 +138,7 @@ def _limit(axes: Axes, places: Array) -> list[str]:
 
 
 def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
-    """Draw elasticities d ln c / d ln p, rows p and columns c; None without sensitivities."""
+    """Draw elasticities d ln c / d ln p of constants c (columns) by parameters p (rows).  Returns None without any."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None

@@ -30,7 +30,7 @@ NAMES = {
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw tractions, jumps and damage, one fibre per row: the most debonded or damaged, else the most loaded."""
+    """Draw tractions, jumps and damage of some fibres in rows: the most damaged, or else the most loaded fibre."""
     file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED
@@ -96,7 +96,7 @@ def _limit(axes: Axes, values: Array) -> None:
 
 
 def _chosen_states(file: Any, document: Document) -> list[str]:
-    """Choose the states to draw.
+    """Choose the states to draw; return their names in result.h5.
 
     For a path: peak (or first state), then valley or last state with tractions; else the middle of partial debonding.
     """
@@ -115,7 +115,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
 
 
 def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> None:
-    """Draw tractions or jumps around a fibre, with earlier states dashed.
+    """Draw tractions, jumps or damage around a fibre, with earlier states dashed.
 
     The background marks the debonded part in the last state.
     """

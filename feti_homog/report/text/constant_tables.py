@@ -36,7 +36,7 @@ MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return tables of L^ef, also under minus the unit strains.  All entries have as many decimals as the largest."""
+    """Return tables of effective stiffnesses and mesh errors, with contact also under minus the unit strains."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -49,7 +49,7 @@ def stiffnesses(document: Document) -> list[Table]:
 
 
 def conductivity(document: Document) -> list[Table]:
-    """Return tables of k^ef and its mesh errors, with closed forms and bounds across the fibres."""
+    """Return tables of the effective conductivity, its mesh errors, and its bounds and estimates."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
     title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
     matrices = (title, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
@@ -107,7 +107,7 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
 
 
 def thermal(document: Document) -> list[Table]:
-    """Return tables of the thermal constants: a row per component, a column per known quantity."""
+    """Return a list with the table of thermal constants; [] without any.  Rows are components, columns quantities."""
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
@@ -122,7 +122,7 @@ def thermal(document: Document) -> list[Table]:
 
 
 def moduli(document: Document) -> Table:
-    """Return a table of the engineering moduli in the plane; text has moduli at the left, ratios at the right."""
+    """Return a table of the moduli in the plane.  Text has moduli at the left, ratios at the right."""
     values, errors = document["moduli"], _errors(document).get("constants", {})
     sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
     names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
@@ -131,7 +131,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of computed constants between their bounds; values outside are marked."""
+    """Return a table of constants between their bounds, or a title alone.  It marks values beyond Reuss and Voigt."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -148,7 +148,7 @@ def bounds(document: Document) -> Table:
 
 
 def cell_constants(document: Document) -> list[Table]:
-    """Return tables of the engineering constants in space.
+    """Return tables of constants in generalized plane strain; [] without constants.
 
     Constants about the fibre axis appear with estimates and bounds.
     """
@@ -231,7 +231,7 @@ def table(document: Document) -> Table:
 
 
 def sensitivities(document: Document) -> list[Table]:
-    """Return tables of elasticities d ln c / d ln p and derivatives dc / dp; none without sensitivities."""
+    """Return tables of d ln c / d ln p and dc / dp for constants c (columns) and parameters p (rows), or []."""
     if (section := document.get("sensitivities")) is None:
         return []
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4
@@ -252,7 +252,7 @@ def sensitivities(document: Document) -> list[Table]:
 
 
 def mesh_errors(document: Document) -> dict[str, float]:
-    """Return estimated mesh errors of constants, stiffness (C11, ...) and conductivity (k11, ...), by name."""
+    """Return estimated mesh errors by name: constants, C11, ..., k11, ..., and normal expansions."""
     numbers: Document = document.get("mesh_error") or {}
     tensors = {"C": numbers.get("effective_stiffness"), "k": numbers.get("effective_conductivity")}
     strains = dict(zip(voigt.EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
@@ -265,5 +265,5 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Return the constants that tables show; for a load, or for secants in space, the first MOST."""
+    """Return the constants that tables show.  For a load, or for secants in space, these are the first MOST."""
     return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else list(names[:MOST])

@@ -11,13 +11,14 @@ from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, wi
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Document
 
-ROWS = 15  # of the table
+ROWS = 15  # rows of the table, unless the caller limits them
 
 
 def path_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of a path: totals above at most `limit` rows of points, by default `ROWS`.
+    """Return the table of a path, with totals above rows of points.
 
-    Columns: leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
+    The table has at most `limit` rows, by default `ROWS`.  Columns: leading and prescribed strains, named and acting
+    stresses, temperature, strains under prescribed stresses; a line names columns beyond the fifth, only in path.csv.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
@@ -99,7 +100,7 @@ def _path_energies(document: Document, label: str) -> list[str]:
     """Describe the energies along a path.
 
     The lines give the work of the loads, the energy stored at the end, the energy lost by breaks along all equilibria
-    and under a rising load, and the debonded fraction.
+    and under a rising load, frictional heat and fracture energy if any, and the debonded fraction.
     """
     points, legs = document["path"], path_curves.legs(document)
     last = points[-1]

@@ -1,4 +1,4 @@
-"""Build the tables of an angle, a load or an envelope, and of energy release rates at tips."""
+"""Build the tables of an angle, a load or an envelope, and of energy release rates G at tips."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, to
 from feti_homog.results import path_curves
 from feti_homog.typing import Document
 
-ENVELOPE_ROWS = 12  # of its table
+ENVELOPE_ROWS = 12  # rows of the envelope table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
@@ -29,7 +29,7 @@ ONSET = {
 }
 RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
          Column("angle", 9))  # fmt: skip
-SECTION = Column("interface", 11, "d")  # of cases that have several
+SECTION = Column("interface", 11, "d")  # for cases with several sections
 LAST_STRAIN = "bonded, open, closed: interface nodes under the unit strain gamma12"
 TIP_TITLE = "Largest energy release rate"
 
@@ -42,7 +42,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of stiffnesses or stresses and interface node counts at up to `limit` angles."""
+    """Return the table of stiffnesses or stresses at up to `limit` angles.  Narrow tables also have node counts."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -60,7 +60,7 @@ def angle_table(document: Document, limit: int | None = None) -> Table:
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
-    """Set the columns of values (n, c) to zero that contain only solver noise."""
+    """Return the values (n, c), with zero in columns that contain only solver noise."""
     columns = np.array(values, float)
     is_there = np.isin(np.arange(columns.shape[1]), path_curves.components_above(path_curves.ZERO, columns))
     return np.where(is_there, columns, 0.0)
@@ -88,7 +88,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Describe the debonded percentage of all interfaces, and of each phase pair if the case has several."""
+    """Describe the debonded percentage of the interfaces.  With several phase pairs, each has its own."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -139,14 +139,14 @@ def components(point: Point) -> tuple[float, float]:
 
 
 def tip_table(document: Document, tips: Document) -> Table:
-    """Return the table of the tip with the largest G for each load."""
+    """Return a table of tips: for each load, the tip with the largest energy release rate G."""
     largest = _largest(tips)
     rows = [list(tip.values()) for tip in largest.values()]
     return Table(f"{TIP_TITLE}{toughness_label(document)}", [Column("load", 9), *_rate_columns(largest)], rows)
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return tables of the largest G for each angle and load; for a single load, with all numbers of the tip."""
+    """Return tables of the largest G for each angle and load, or [].  A single load has all numbers of the tip."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
@@ -157,7 +157,7 @@ def angle_tip_table(document: Document) -> list[Table]:
 
 
 def _largest(tips: Document | None) -> dict[str, Document]:
-    """Return the tip with the largest G for each load, in load order."""
+    """Return the tip with the largest G for each load, in load order; {} without tips."""
     best: dict[str, Document] = {}
     names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():

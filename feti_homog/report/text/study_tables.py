@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document, axes: str = "") -> str:
-    """Return the fit tables: unknowns, correlations, measured values; `axes` is a remark on names that mislead."""
+    """Return the fit tables: unknowns, correlations, measured values.  `axes` is a remark on misleading names."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
@@ -56,7 +56,7 @@ def _dash(value: float | None) -> float | str:
 
 
 def scatter_text(document: Document) -> str:
-    """Return the table of results with scatter and input contributions, and remarks on noisy slopes."""
+    """Return the table of results with scatter and input contributions.  Remarks name noisy slopes."""
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"

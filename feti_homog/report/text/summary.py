@@ -19,7 +19,7 @@ LABEL = 12  # characters of the labels at the left
 NAME = 28  # characters of the check names
 GLUE = "\N{NO-BREAK SPACE}"  # prevents a line break
 REMARKS = ("Remark", "Warning", "Fault")
-POINTS = 4  # of a curve, in tables of phase stresses
+POINTS = 4  # points of a curve in tables of phase stresses
 STRESSES = {"principal": "principal", "von_mises": "von Mises", "hydrostatic": "hydrostatic"}
 
 
@@ -62,10 +62,8 @@ def summary(document: Document) -> str:
     """Return the printed summary of a result.
 
     The summary has cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
-    Lines have up to 79 characters, tables up to 100, except for long names.
-
-    Raises:
-        KeyError: the document lacks a required key.
+    Lines have up to 79 characters, tables up to 100, except for long names.  Raises KeyError if the document lacks a
+    key.
     """
     size, solver = document["memory"], document["solver"]
     names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
@@ -103,7 +101,7 @@ def short_summary(document: Document) -> str:
 
 
 def notebook(document: Document) -> str:
-    """Return the title, tables, checks and status of a result as HTML."""
+    """Return the title, tables, checks and status of a result as HTML.  Tables have at most 20 points."""
     tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
@@ -165,7 +163,7 @@ def _cell(document: Document) -> list[str]:
     mesh += [f"order {shape['order']}"] * ("order" in shape)
     if "refine" in shape:
         mesh.append(f"refine {shape['refine']}")
-    elif "accuracy" in shape:  # by which the program chose the mesh
+    elif "accuracy" in shape:  # the program chose the mesh by it
         chosen = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
         mesh.append(f"{chosen} for accuracy = {shape['accuracy']:g}")
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
@@ -212,7 +210,7 @@ def _number(count: int, name: str) -> str:
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return tables of stresses and utilisations in all states, or at some points on a curve; [] without stresses."""
+    """Return tables of stresses and utilisations of the phases; [] without stresses.  Curves show only some points."""
     phases = document.get("phase_stresses", ())
     if not phases:
         return []
@@ -250,9 +248,9 @@ def phase_tables(document: Document) -> list[Table]:
 
 
 def _states(document: Document, count: int) -> Sequence[int]:
-    """Return the numbers of the states that the tables show."""
+    """Return the numbers of the states in the tables of phase stresses."""
     if "path" in document and "states" in document:
-        from feti_homog.results import landmarks  # of paths alone
+        from feti_homog.results import landmarks  # only paths have landmarks
 
         return landmarks.landmark_states(document, POINTS, count)
     points = len(document.get("angle", ())) or (count if "path" in document else 1)
@@ -261,6 +259,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value and its position in words, "-" for the value zero."""
+    """Return a value without noise, and its position in words.  The position is "-" for the value zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"

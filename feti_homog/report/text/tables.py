@@ -48,7 +48,7 @@ def stress_label(document: Document) -> str:
 
 
 def toughness_label(document: Document) -> str:
-    """Return the unit of energy release rates, in brackets; empty unless the case labels both units."""
+    """Return the unit of energy release rates, in brackets.  It is empty unless the case labels both units."""
     output = document["case"].get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     return in_brackets(f"{stress} {length}") if stress and length else ""
@@ -84,7 +84,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of strings and numbers; rows are as long as `columns` or shorter.
+    """A table of strings and numbers.  Rows are as long as `columns` or shorter.
 
     Attributes:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
@@ -129,7 +129,7 @@ class Table:
 
     @property
     def cells(self) -> list[list[str]]:
-        """Return the rows as strings: numbers with the column decimals, or seven digits."""
+        """Return the rows as strings for HTML.  Numbers have the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
 
         def cell(value: Any, form: str) -> str:  # noise becomes zero, but even small errors stay unchanged
