@@ -158,8 +158,8 @@ class Arrangement:
 
 def clearance(arrangement: Arrangement) -> float:
     """Return the least distance between a cell side and a line tangent to an outline."""
-    touching = _tangents(arrangement) / arrangement.size[:, None]
-    return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
+    tangents, size = _tangents(arrangement), arrangement.size[:, None]
+    return float(np.abs(tangents - size * np.round(tangents / size)).min())
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:

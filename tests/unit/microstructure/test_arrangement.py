@@ -8,7 +8,7 @@ from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, random_arrangement
-from feti_homog.microstructure.arrangements import Arrangement, clear_shift, neighbours
+from feti_homog.microstructure.arrangements import Arrangement, clear_shift, clearance, neighbours
 
 
 def smallest_gap(arrangement):
@@ -115,3 +115,13 @@ def test_shift_clears_tangency_and_keeps_the_arrangement():
     for axis in (0, 1):
         distance = np.abs((after.centres[:, axis] + 0.5) % 1 - 0.5)
         assert np.abs(distance - after.radii).min() > 0.04
+
+
+@pytest.mark.parametrize("height", [0.2, 1.0, 5.0])
+@pytest.mark.parametrize("gap", [0.01, 0.03])
+def test_clearance_is_a_distance_along_either_axis(height, gap):
+    """Both in the cell and in the cell turned by 90 degrees."""
+    y, radius = height - 0.05 - gap, 0.05
+    upright = Arrangement.of_discs(1.0, height, np.array([[0.5, y]]), np.array([radius]), ("fibre",))
+    turned = Arrangement.of_discs(height, 1.0, np.array([[y, 0.5]]), np.array([radius]), ("fibre",))
+    assert clearance(upright) == pytest.approx(gap) == clearance(turned)
