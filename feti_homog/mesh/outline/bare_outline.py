@@ -46,7 +46,7 @@ class BareOutline:
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
-        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves.
+        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves; else `bridges` is None.
         """
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size

@@ -40,10 +40,10 @@ def wrap(points: Float, size: Float) -> Float:
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Return the longest edge (k,) on each circle, for at least MIN_EDGES_AROUND edges.
+    """Return the longest edge (k,), up to `largest`, on each circle of `arrangement.shells`.
 
-    Edges on a coating of thickness t and inner radius a have a length of at most sqrt(t a). The distance to the arcs
-    is then at most t / 8, and elements across the coating do not turn over when edges bend.
+    A circle has at least MIN_EDGES_AROUND edges. Edges on a coating of thickness t and inner radius a are at most
+    sqrt(t a) long: their arcs rise at most t / 8, and elements across the coating do not turn over when edges bend.
     """
     shells, disc = arrangement.shells
     caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
@@ -109,7 +109,7 @@ class MeshSizes:
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
-        """Return the sizes (N,) on the circles of each disc."""
+        """Return the edge sizes (N,) on the circles of N discs; a disc and its coating have one size."""
         sizes = np.minimum(self.interface, coating_size(arrangement))
         around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)

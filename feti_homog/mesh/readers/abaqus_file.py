@@ -103,7 +103,7 @@ class _Content:
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Read elements, and check the node counts against the element type."""
+        """Read elements; ValueError for other types and wrong or repeated numbers."""
         if self.is_assembly:
             raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()
@@ -125,7 +125,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Read the members of a set: numbers, set names or, with GENERATE, ranges with a step (default 1)."""
+        """Read the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -143,14 +143,14 @@ class _Content:
                 members.update(part)
 
     def members(self, name: str) -> set[int]:
-        """Return the elements of a set, from sections, *ELSET and *ELEMENT."""
+        """Return the elements of a set, from sections, *ELSET and *ELEMENT; ValueError for an unknown set."""
         levels = [self.sets[level, name] for level in (BY_SECTION, BY_SET, BY_ELEMENTS) if (level, name) in self.sets]
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
     def raw_mesh(self) -> RawMesh:
-        """Group the triangles by set names, and add the sets of lines.
+        """Return the mesh, with triangles grouped by set names, and with sets of lines as curves.
 
         Raises:
             MeshError: triangles, nodes of elements, or sets of sections are missing.

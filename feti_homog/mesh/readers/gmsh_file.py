@@ -128,7 +128,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into sections by name, without the first and last lines of sections."""
+    """Split a file into its sections, without first and last lines, by name; OTHERS are skipped.  Raises MeshError."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -186,7 +186,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: nodes or elements share a number, a node is missing, or an element type is not in LINES or TRIANGLES.
+        MeshError: numbers repeat; nodes, triangles or lines of DEBONDED are missing; other element types occur.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])

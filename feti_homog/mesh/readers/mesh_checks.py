@@ -56,7 +56,7 @@ def not_finite(mesh: RawMesh) -> list[str]:
 
 
 def not_planar(mesh: RawMesh) -> list[str]:
-    """Name the first node outside the plane of node 0."""
+    """List the first node outside the plane of node 0."""
     height = mesh.points[:, 2]
     bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
     places = (f"{mesh.node(int(k))} has z = {height[k]:.9g}" for k in (*bad[:1], 0))
@@ -138,7 +138,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie on inner edges with a single triangle.
 
-    `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
+    `plane` (n, 2) are positions from the lower left corner, exact on sides; too many candidates give only a count.
     """
     single = mesh.border
     inner = single[~on_sides(plane[single], size)]

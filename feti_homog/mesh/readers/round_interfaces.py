@@ -75,7 +75,7 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
-    interfaces do not change. In triangles with two edges on one ellipse, an edge flips.
+    interfaces do not change. In triangles with two edges on one ellipse, the third edge flips.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -98,8 +98,9 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
 def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
-    Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
-    chord. In a triangle with two edges on one curve, one flips: the curve has no corner there.
+    Edges on circles and ellipses do not change, nor do edges without a middle node, or with a middle node within
+    STRAIGHT edge lengths of the chord. In triangles with two edges on one curve, which has no corner there, the third
+    edge flips.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -178,7 +179,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2) onto a circle, and side nodes along the side; None if impossible."""
+    """Move points (k, 2) onto a circle, side nodes along the side; None for corners and nodes that cannot reach it."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -219,7 +220,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
 
 
 def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether a chain of positions (k, 2) is on an ellipse F, with steps |F^-1 d| <= 1."""
+    """Return whether a closed chain of positions (k, 2) lies on an ellipse, in steps of at most 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))

@@ -86,7 +86,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Read the nodes of all cells, and the node count of each cell."""
+    """Read the nodes of all cells, and the node count of each cell.  Raises MeshError."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
@@ -190,13 +190,13 @@ class Scanner:
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Convert a word into a number of values."""
+        """Convert a word into a number of values; MeshError for any other word."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Read an array (count,) of the VTK type `name`."""
+        """Read an array (count,) of the VTK type `name`; MeshError for missing or wrong values."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
@@ -220,6 +220,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the number of the current line."""
+        """Raise MeshError, with the number of the current line of a text file."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")

@@ -47,7 +47,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR."""
+    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR.  Raises QhullError."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
