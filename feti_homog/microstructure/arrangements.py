@@ -65,7 +65,7 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Arrange discs with centres (N, 2), radii (N,) and coatings (N,)."""
+        """Arrange discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 
@@ -110,7 +110,7 @@ class Arrangement:
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
         """Return the region numbers (k,), from 1, of the insides or rings of fibres (k,).
 
-        Coatings follow all fibres, in the same order.
+        Coatings follow all fibres, in the order of fibres; the ring of a hollow fibre has the fibre number.
         """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
@@ -157,7 +157,7 @@ class Arrangement:
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Return the least distance between a cell side and a line tangent to an outline."""
+    """Return the least distance / period between a cell side and a parallel tangent, times the cell width."""
     touching = _tangents(arrangement) / arrangement.size[:, None]
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
@@ -168,7 +168,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     The candidates along an axis are the middles of the widest gaps between tangents. Two candidates make a corner; the
     corner farthest from all outlines is selected. In symmetric cells, for example with two discs, several corners are
     equally far up to rounding errors: the first is selected, so that the length unit does not matter. Corners in voids
-    are excluded (`in_voids`).
+    (`in_voids`) are excluded if others exist.
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
@@ -192,7 +192,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     """Return the mask (n,) of corners (n, 2) within voids, for cells with polygons.
 
-    Meshes of other cells need no node at a corner.
+    All entries are False for other cells, for which meshes need no node at a corner.
     """
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, Conics):

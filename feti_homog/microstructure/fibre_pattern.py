@@ -68,7 +68,7 @@ class FibrePattern:
     def images(self, reach: float) -> tuple[Float, Int]:
         """Return the centres (m, 2) of discs and images within `reach`, and the disc indices (m,).
 
-        The N discs in the rectangle come first.
+        The N discs in the rectangle come first; a window has no images.
         """
         number = np.arange(self.count)
         if not self.periodic:

@@ -33,7 +33,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     Coordinates of fibres that are not discs are always rounded.
 
     Raises:
-        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch; one line per fault.
+        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch, one line per fault; or a cut
+            window has no room for the moves.
     """
     table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
@@ -197,7 +198,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows that are the first image of a fibre, and faults of other images."""
+    """Return the mask (N,) of first images, or of all rows in a cut window, and the faults of other images."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])

@@ -72,7 +72,7 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Find the nearest neighbours of all fibres; in a periodic cell images of all fibres count."""
+    """Find the `count` nearest neighbours of all fibres; in a periodic cell, images of all fibres count."""
     # Within `reach` every fibre in a periodic cell has `count` neighbours.
     reach = (count + 1) // 2 * pattern.size.min()
     if pattern.periodic and pattern.count > count:
@@ -206,9 +206,9 @@ def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Place the fibres of a pattern at random, with gaps of at least `gap`.
+    """Place the fibres of a pattern at random, with gaps of at least `gap`; return the pattern.
 
-    Raises MeshError if the search finds no such pattern.
+    Raises MeshError for discs denser than DENSEST, or if ATTEMPTS descents of up to `max_steps` steps fail.
     """
     grown = pattern.radii + gap / 2
     attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0

@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs, by Steiner's formula A + P r + pi r^2 for a core and disc of radius r."""
+        """The radii (k,) of equal-area discs; Steiner: A + P r + pi r^2 for core area A, perimeter P and disc radius r."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -60,7 +60,7 @@ class ConvexSums(ConvexCurves):
         return replace(self, frames=frames)
 
     def support(self, normal: Float) -> Float:
-        """Return the support functions max_v v . n + |F^T n| (k, ...) at unit vectors n (k, ..., 2)."""
+        """Return the supports max_v v . n + |F^T n| (k, ...), with corners v of V, at unit vectors n (k, ..., 2)."""
         core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) at vectors (n, k, 2) from the centres, by at least POINTS boundary points."""
+        """Return the distances (n, k) from positions, vectors (n, k, 2) off the centres, to POINTS or more points."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
@@ -129,7 +129,7 @@ class PolygonalRows:
     columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
-        """Return which rows (N,) have sides."""
+        """Return the mask (N,) of rows with sides."""
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:

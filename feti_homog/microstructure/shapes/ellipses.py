@@ -56,7 +56,7 @@ class Ellipses(ConvexCurves):
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Lengthen both semi-axes by `thickness` (k,)."""
+        """Lengthen both semi-axes, the columns of F, by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -128,7 +128,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, like `ConvexSums.parting`."""
+        """Find the directions that best separate pairs, and both supports; see `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -178,7 +178,7 @@ class EllipticRows:
     )
 
     def given(self, rows: Columns) -> Bool:
-        """Return which rows (N,) have two different semi-axes."""
+        """Return the mask (N,) of rows with two different semi-axes."""
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:

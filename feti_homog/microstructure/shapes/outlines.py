@@ -65,7 +65,7 @@ class ConvexCurves:
 
 
 class ColumnRange(NamedTuple):
-    """The numbers that a table column allows: value of an empty cell, and bounds."""
+    """The numbers in a table column: value of an empty cell, and lower bounds, inclusive and exclusive."""
 
     empty: float
     least: float = -np.inf
