@@ -24,8 +24,8 @@ def moves(outlines: Outlines, size: Float) -> Float:
     least the smallest gap inside the window, clipped to the range LEAST_GAP to MOST_GAP; other gaps fall below this
     value only if they were smaller before. Gaps are relative to the sum of the radii. Each step replaces the
     constraints |v| >= r on vectors v between centres by n . v >= r, with the present directions n; since n . v <= |v|,
-    its solution satisfies the constraints. For outlines other than discs, radii are those of equal-area discs, and n
-    is the direction of the largest gap n . v - r, where r is the sum of both supports along n.
+    its solution satisfies the constraints. Outlines other than discs have the radii of equal-area discs; n is the
+    direction of the largest gap n . v - r, where r is the sum of both supports along n.
 
     Raises:
         MeshError: the torus has no room for such moves.

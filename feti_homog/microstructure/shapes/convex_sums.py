@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs; Steiner: A + P r + pi r^2 for core area A, perimeter P and disc radius r."""
+        """The radii (k,) of discs of area A + P r + pi r^2 (Steiner), with area A, perimeter P of cores, disc radius r."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return the distances (n, k) from positions, vectors (n, k, 2) off the centres, to POINTS or more points."""
+        """Return the distances (n, k) at vectors (n, k, 2) from the centres, to POINTS or more points on an outline."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
