@@ -184,7 +184,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.
 
-        Name, PETSc options and max_events are left out; without `with_output`, [output] is left out, too.
+        Name, PETSc options and max_events are left out, also [output] without `with_output`; files count by content.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
@@ -275,7 +275,7 @@ def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str 
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section into a dataclass; return None for a faulty or absent section."""
+    """Read a section into a dataclass, with defaults if it may be absent; None if faulty or missing."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

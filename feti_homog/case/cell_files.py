@@ -26,7 +26,7 @@ LEFT_OUT = 0.01
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Read the files of a cell into its section, and append all faults to `faults`."""
+    """Return the cell with the contents of its files, and append faults of files and sizes to `faults`."""
     cell = _with_match(cell, folder, faults)
     faults += size_faults(cell)
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):

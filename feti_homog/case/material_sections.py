@@ -129,5 +129,5 @@ def missing_expansions(materials: Mapping[str, material_forms.Material], needed_
 
 
 def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:
-    """Return the phase that provides the material: the phase itself, or "fibre" for "fibre:2"."""
+    """Return the phase that provides the material: the phase itself or, for "fibre:2" without a section, "fibre"."""
     return phase if phase in materials else phase.partition(":")[0]

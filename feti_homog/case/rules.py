@@ -38,7 +38,7 @@ class Rule:
     """A requirement on the value at a document path, under some conditions.
 
     Attributes:
-        path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
+        path: names from the section to a table or value; the rule holds without a value. Empty: the whole document.
         holds: test of the value; None if the path must not have a value.
         words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.

@@ -281,7 +281,7 @@ KEY_OWNERS = {
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """Read PETSc options by name; the run itself checks options with the prefix feti_."""
+    """Read PETSc options, and append faults to `faults`; {} for no table.  The run checks options feti_ itself."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}
