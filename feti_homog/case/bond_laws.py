@@ -20,7 +20,7 @@ class BondLawEntry:
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows with damage before a bond breaks.
-        has_process_zone: whether elements must resolve the length along which bonds break.
+        has_process_zone: whether elements must resolve the length of the zone where bonds break.
     """
 
     name: str
@@ -82,5 +82,5 @@ DEFAULT = REGISTRY[0].name
 
 
 def laws_with(key: str) -> tuple[str, ...]:
-    """Return the names of the laws that have a key of [interface]."""
+    """Return the names of the bond laws with the [interface] key `key`."""
     return tuple(entry.name for entry in REGISTRY if key in entry.keys)

@@ -26,7 +26,7 @@ LEFT_OUT = 0.01
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with the contents of its files, and append faults of files and sizes to `faults`."""
+    """Return the cell with absolute file names and the contents of tables; append all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
     faults += size_faults(cell)
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
@@ -53,9 +53,9 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Read the window that a random cell matches, and append faults to `faults`.
+    """Return a random cell with the window that it matches; append faults to `faults`.
 
-    If the cell gives no fibre count or no fibre fraction, the window provides the value.
+    The window provides a missing fibre count or fraction. Without a readable window, the cell does not change.
     """
     if cell.match is None:
         return cell
@@ -80,7 +80,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Read the fibre table of a cell, with the cell size, and append faults to `faults`."""
+    """Return a cell with its fibre table, unchanged if this is not readable; append faults to `faults`."""
     from feti_homog.microstructure import fibre_table  # which few cases need
     from feti_homog.microstructure.shapes import shapes
 

@@ -29,7 +29,7 @@ def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases so close to incompressible that rounding may fail the checks, one per line."""
+    """List nearly incompressible phases, for which checks may fail by rounding, one per line."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
@@ -54,7 +54,7 @@ def _above(limit: float, materials: Mapping[str, material_forms.Material], plane
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
-"""Keys that the key `accuracy` determines, and therefore excludes."""
+"""Keys that the key `accuracy` determines and excludes."""
 
 # By element order, the error of the coarsest mesh with stiff inclusions / (kappa beta^2), and the factor by which soft
 # inclusions raise this error: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
@@ -77,9 +77,9 @@ def sized(
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
     `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Without an accuracy, only the
-    order is set, to 2 if linear elements lock. Faults are added to `faults`: r above MOST_REFINED, and order 1 that
-    locks. The coarsest elements have half the fibre distance of a square lattice with this fibre count, to two digits,
-    and at most half the width: with smaller elements at circles and gaps, coarser meshes hardly have fewer elements.
+    order is set, to 2 if linear elements lock. Faults are added to `faults`: r above MOST_REFINED, and a locking order.
+    The coarsest elements have half the fibre distance of a square lattice with this fibre count, to two digits, and at
+    most half the width: with smaller elements at circles and gaps, coarser meshes hardly have fewer elements.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -108,7 +108,7 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Suggest `accuracy` if default elements for a fibre table are longer than the mean radius; else []."""
+    """Suggest `accuracy` if default elements for a fibre table are longer than the mean fibre radius, else []."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())

@@ -122,7 +122,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for unit loads; one-sided contact needs both signs."""
+        """Return the number of solves for a number of unit `loads`; one-sided contact needs both signs."""
         return 2 * loads if one_sided else loads
 
 
@@ -156,7 +156,7 @@ class Angle(AnalysisSection):
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for all openings."""
+        """Return the number of solves: for each opening, one under `strain`, or one for each unit load."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 

@@ -24,7 +24,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Read a TOML document, with the file name, without suffix, as default name.  Raises CaseError."""
+    """Read a TOML document; its default `name` is the file name without suffix.  Raises CaseError."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -61,7 +61,7 @@ def to_document(values: object) -> dict[str, Any]:
 
     Raises:
         TypeError: the values are not a mapping.
-        CaseError: a key is not a string, an integer is too large for messages, or a table is too long or too deep.
+        CaseError: a key is not a string, an integer is too large for messages, or a table or list is too long or deep.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
@@ -76,7 +76,7 @@ def to_document(values: object) -> dict[str, Any]:
 
 def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> Any:
     if type(value) in (float, str, bool) or (type(value) is int and value.bit_length() <= MAX_BITS):
-        return value  # most values; other types, such as those of NumPy, follow
+        return value  # most values; other types, such as NumPy scalars, follow
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, Mapping | list | tuple):

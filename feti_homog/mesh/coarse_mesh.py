@@ -1,4 +1,4 @@
-"""Represent the coarse periodic mesh of a rectangular cell on rank 0, with interface and void edges."""
+"""Represent the coarse mesh of a rectangular cell, with periodic images of nodes and edges on interfaces."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -42,15 +42,15 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """A conforming periodic mesh of straight triangles, on rank 0 only.
+    """A conforming mesh of straight triangles or square pixels.
 
     Attributes:
         width, height: cell periods.
         points: (n, 2) nodes in the plane.
         triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
-            square pixels, the lower left corner first, from which `refinement.halved` makes triangles.
-        phase: (m,) index into `phases`, whose first name is "matrix".
-        precedence: (m,) sort key by which constituents are numbered: 0 in the matrix, else the fibre number, or the
+            square pixels, the lower left corner first; `refinement.halved` cuts pixels into triangles.
+        phase: (m,) index into `phases`; the first phase is "matrix".
+        precedence: (m,) sort key for the numbers of constituents: 0 in the matrix, else the fibre number, or the
             phase if fibres have no numbers.
         representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
@@ -131,7 +131,7 @@ def twins(keys: Int) -> tuple[Int, Int]:
 
 
 def representatives(points: Float, width: float, height: float) -> Int32:
-    """Return the representative (n,) of each node, for sides that match exactly.
+    """Return the representative (n,) of each node on the torus.
 
     The partner at x = 0 represents a node at x = width, the partner at y = 0 a node at y = height, and the origin all
     four corners. Every other node represents itself.

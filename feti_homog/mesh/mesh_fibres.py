@@ -124,8 +124,8 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """Return the numbers (constituents,) of fibres and coatings, and the mask (constituents,) of fibres.
 
-    Fibres count from 1; the matrix has 0. A coating has the lowest number of the fibres in it; without any, it is a
-    fibre itself.
+    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of the fibres in it; without any, it is
+    a fibre itself.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]

@@ -210,7 +210,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Return the class of the node at `position`, from 1 to M - 1 along a torus edge of the rank."""
+    """Return the class of the node at `position`, 1 to M - 1, on a torus `edge`, after `n_classes` coarse classes."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 

@@ -37,8 +37,8 @@ class Arrangement:
         outlines: N outlines without rings. Fibre k + 1 of a case has the index k; voids follow the fibres.
         phase: (N,) phases of the outlines.
         coating: (N,) thickness of the rings around the outlines, 0 without a ring.
-        is_hollow: (N,) mask of voids in hollow fibres, whose ring has the fibre phase; other rings are coatings.
-        mesh_order: (N,) meshing order, on which a few triangles depend; by index if None.
+        is_hollow: (N,) mask of voids in hollow fibres; their rings have the fibre phase, other rings are coatings.
+        mesh_order: (N,) meshing order, which changes a few triangles; by index if None.
         row: (N,) row indices in the fibre table; None for cells without a table.
         origin: lower left corner of the cell in the coordinates of the table.
         remarks: lines on the differences between the cell and the table.
@@ -136,12 +136,12 @@ class Arrangement:
 
     @cached_property
     def outer(self) -> Outlines:
-        """The N outlines enlarged by their rings."""
+        """The N outlines enlarged by rings."""
         return self.outlines.grown(self.coating)
 
     @property
     def outer_radii(self) -> Float:
-        """The radii (N,) of equal-area discs, with rings."""
+        """The radii (N,) of equal-area discs, plus the thickness of rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
@@ -192,7 +192,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     """Return the mask (n,) of corners (n, 2) within voids, for cells with polygons.
 
-    All entries are False for other cells, for which meshes need no node at a corner.
+    All entries are False for other cells: their meshes need no node at a corner.
     """
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, Conics):

@@ -55,7 +55,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        For a window the value is unbiased: on average, discs have as much area outside as others have inside.
+        For a window the value is unbiased: these discs outside and other discs inside have equal areas on average.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 

@@ -98,7 +98,7 @@ class FibreTable:
 
     @property
     def outer_radius(self) -> Float:
-        """The radii (N,) with coating."""
+        """The radii (N,) plus the thickness of coatings."""
         return self.radius * (1 + self.coating)
 
 

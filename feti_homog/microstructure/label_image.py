@@ -1,4 +1,4 @@
-"""Read grey images, and label images, such as segmented micrographs, whose pixels hold phase numbers."""
+"""Read grey images, and label images, such as segmented micrographs, with phase numbers as pixels."""
 
 from collections.abc import Mapping
 from functools import partial

@@ -99,7 +99,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to GMSH_DECIMALS.
+    """Round the lengths of an arrangement to DECIMALS decimals, and its height to GMSH_DECIMALS.
 
     Centres on the right or upper side move to 0.
     """

@@ -12,7 +12,7 @@ from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 
-# Number of neighbours whose distances are matched: the nearest and the second nearest.
+# Number of neighbours with matched distances: the nearest and the second nearest.
 SHELLS = 2
 # Limits of the trial moves: per fibre, and in total.
 MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
@@ -180,8 +180,8 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
     Returns the centres and the clearance, the smallest ratio of distance to radius sum; success is a clearance of at
-    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx has no reductions over the discs, so that every machine gets
-    the same numbers.
+    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
+    reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0

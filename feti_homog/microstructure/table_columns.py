@@ -90,7 +90,7 @@ ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
 AXES_OF_PICTURES = {"major", MATLABS_AXIS}
-"""Names of major axes in tables whose y points down, but whose angles are counter-clockwise in the picture."""
+"""Names of major axes in tables where y points down, but angles are counter-clockwise in the picture."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
@@ -159,7 +159,7 @@ def are_units(words: Sequence[str]) -> bool:
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the missing column whose name resembles a word, or an empty string."""
+    """Return the missing column with a name similar to a word, or an empty string."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 

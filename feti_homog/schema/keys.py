@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """A key of `section` that decides which other keys belong to the case; messages call it `word`, else `key`."""
+    """A key of `section` that decides which other keys belong to the case; `word` may rename it in messages."""
 
     section: str
     key: str
@@ -100,7 +100,7 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field that holds the rules of one key; field and key have one name.
+    """Return a dataclass field that holds the rules of the key with the field name.
 
     Without `default` and `absent`, the key is required.  A required key with conditions, or a missing key with the
     meaning `absent`, has the value None.  `default_words` replace the default in the reference.  `attributes` are

@@ -1,6 +1,6 @@
 """Mesh a label image within smooth outlines: contours by marching squares, filled by gmsh.
 
-The cell sides run through pixel centres. Contours cross opposite sides at the same positions, so that sides match.
+The cell sides run through pixel centres. Contours cross opposite sides at equal positions, so that sides match.
 """
 
 from dataclasses import replace

@@ -23,7 +23,7 @@ TRIANGLE_AREA = math.sqrt(3.0) / 4.0
 TRIANGLES_OF_A_FIBRE = 160
 # Ratios of element sizes; the largest exceeds every ratio in a case.
 RATIOS = np.geomspace(1.0, 1e7, 400)
-# Number of positions along each axis at which the size is sampled.
+# Number of samples of the size along each axis.
 POSITIONS = 200
 
 
@@ -63,7 +63,7 @@ class ElementEstimate:
 
     @property
     def interface_size(self) -> float:
-        """The element size on interfaces."""
+        """The element size on interfaces, for at least MIN_EDGES_AROUND edges around the mean fibre."""
         asked = self.cell.interface_size or self.cell.mesh_size
         return min(asked, 2 * math.pi * self.mean_radius / MIN_EDGES_AROUND)
 

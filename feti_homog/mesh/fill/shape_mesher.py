@@ -144,10 +144,11 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 
 
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
-    """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, with the growth g.
+    """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
     h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle that rounds corners or fits in an ellipse,
-    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline or opposite side.
+    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
+    side that the outline faces; it is at least LEAST cell sizes.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

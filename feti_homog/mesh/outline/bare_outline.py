@@ -90,10 +90,9 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, with matching nodes on opposite sides.
+        """Make the outline from nodes on arcs and bridges, and matching nodes on opposite sides.
 
-        Raises:
-            MeshError: the sides would have more nodes than the sampling allows.
+        Raises MeshError if the sampling allows fewer nodes on sides.
         """
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
@@ -115,7 +114,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield the nodes (n, 2) and the curves of the two sides along `axis`, whose nodes match."""
+        """Yield nodes (n, 2) and curves of each of the two sides along `axis`, with matching nodes."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)

@@ -154,7 +154,7 @@ class Sampling:
     most_nodes: int
 
 
-# For cells that one rank meshes in minutes, and for cells that all ranks mesh, whose arcs are a few edges long.
+# For cells that one rank meshes in minutes, and for cells that all ranks mesh: these have arcs of a few edges.
 WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
 
 

@@ -12,9 +12,9 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Float, Int, Int32
 
-# Number of coincident pairs below which all are listed: the number grows with the square of the nodes.
+# All coincident pairs are listed up to this number, because it grows with the square of the nodes.
 MOST_PAIRS = 1000
-# Limit for pairs of an edge and a nearby node, whose number may also grow with the square.
+# Limit for pairs of an edge and a nearby node: their number may also grow with the square of the nodes.
 MOST_CANDIDATES = 10**7
 # Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
@@ -77,7 +77,7 @@ def duplicate_nodes(mesh: RawMesh) -> list[str]:
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T
-    square = column * (row.max() + 1) + row  # whose diagonal is shorter than the reach
+    square = column * (row.max() + 1) + row  # a diagonal is shorter than the reach
     order = np.argsort(square, kind="stable")
     same = square[order[1:]] == square[order[:-1]]
     pairs = np.sort(np.column_stack([order[:-1][same], order[1:][same]]), axis=1)
@@ -168,7 +168,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:
-    """List debonded lines whose ends are not nodes of triangles."""
+    """List debonded lines with an end that is no node of a triangle."""
     bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are no edges of triangles: '
     return _listed(fault, bad, lambda ends: f"that between nodes {ends[0]} and {ends[1]}")

@@ -81,7 +81,7 @@ class RawMesh:
         return np.asarray(pairs[first[count == 1]])
 
     def node(self, number: int) -> str:
-        """Describe a node in words."""
+        """Describe a node in words: number and position."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
@@ -90,7 +90,7 @@ class RawMesh:
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """Describe an edge in words."""
+        """Describe an edge in words, by both nodes."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
@@ -100,7 +100,7 @@ def at(point: Float) -> str:
 
 
 def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """List the first few names and count the remaining names."""
+    """List the first `shown` of `total` names, and count the other names."""
     listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
     return listed if total <= shown else f"{listed} and {total - shown} more"
 

@@ -210,7 +210,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(matrix, np.ones(len(x)), rcond=None)
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
-    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # but for rounding, the conic may be a parabola
+    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # up to rounding, the conic may be a parabola
         return None
     centre = -np.linalg.solve(A, [bx, by]) / 2
     level = 1 + centre @ A @ centre

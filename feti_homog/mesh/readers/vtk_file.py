@@ -185,7 +185,7 @@ class Scanner:
         return "" if match is None else match[0].decode(errors="replace")
 
     def follows(self, word: str) -> bool:
-        """Return whether the next word is `word`."""
+        """Return whether the next word, in capitals, is `word`."""
         match = WORD.search(self.content, self.place)
         return match is not None and match[0].upper() == word.encode()
 

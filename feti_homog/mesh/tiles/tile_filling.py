@@ -87,7 +87,7 @@ def fill(tile: Tile) -> Filling:
         surfaces, circle, within = _add_surfaces(gmsh, tile)
         if tile.is_graded:
             # The element size is h + g d at the distance d from the nearest outline edge, of length h. Otherwise gmsh
-            # would interpolate between the lines: a disc would be as fine inside as on the circle.
+            # would interpolate between the lines, and elements inside a disc would have the size on the circle.
             field = gmsh.model.mesh.field
             extended = field.add("Extend")
             field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])

@@ -87,7 +87,7 @@ class ConvexSums(ConvexCurves):
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, q, 2) whose outward normals are n (k, q, 2)."""
+        """Return the points (k, q, 2) with the outward normals n (k, q, 2)."""
         corner = np.einsum("kmi,kqi->kqm", self.cores, normal).argmax(axis=2)
         turned = np.einsum("kij,kqi->kqj", self.frames, normal)
         length = np.linalg.norm(turned, axis=2, keepdims=True)

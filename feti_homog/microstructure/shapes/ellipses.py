@@ -103,7 +103,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the parameters (k,) at which rays from the centres along d (k, 2) intersect the ellipses."""
+        """Return the parameters (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
@@ -139,7 +139,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, 2) whose outward normals are n (k, 2)."""
+        """Return the points (k, 2) with the outward normals n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
@@ -264,4 +264,4 @@ class Discs(ConvexCurves):
 
 
 Conics = Discs | Ellipses
-"""Outlines whose meshes may have nodes at the tips of debonded arcs."""
+"""Outlines that may have nodes at the tips of debonded arcs in meshes."""
