@@ -127,10 +127,7 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase. Raises KeyError.
-
-        A phase "fibre:2" without a section has the material of "fibre".
-        """
+        """Return the material of a phase; "fibre:2" without a section has the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property

@@ -63,7 +63,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure import fibre_pattern, random_fibres  # import SciPy's trees, which few cases need
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # few cases need SciPy's trees
 
     try:
         window = fibre_pattern.read_window(file)
@@ -80,8 +80,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Return a cell with its fibre table, unchanged if this is not readable; append faults to `faults`."""
-    from feti_homog.microstructure import fibre_table  # which few cases need
+    """Return a cell with its fibre table, unchanged if the table is not readable; append faults to `faults`."""
+    from feti_homog.microstructure import fibre_table  # few cases need it
     from feti_homog.microstructure.shapes import shapes
 
     try:
@@ -130,7 +130,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
     """Append the faults of shapes and hollow fibres to `faults`."""
-    from feti_homog.microstructure.shapes import shapes  # which few cases need
+    from feti_homog.microstructure.shapes import shapes  # few cases need it
 
     rows, before = table.columns, len(faults)
     _tell(table, shapes.have_both_sizes(rows), shapes.BOTH_SIZES, faults)

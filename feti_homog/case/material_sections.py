@@ -84,7 +84,7 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
 def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
-    """Read the material of a section, in the form that its keys select; None for faulty keys."""
+    """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
     given: dict[str, list[str]] = {}
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:

@@ -54,6 +54,7 @@ class TableReference:
     Attributes:
         section: name of the section: "cell", "material", ...; "name" for the key before the first section.
         place: position in the file: "[cell]", "[material.PHASE], isotropic", ...
+        meaning, rows: purpose of the table, and its keys.
     """
 
     section: str

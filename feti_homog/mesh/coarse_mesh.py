@@ -146,7 +146,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
     """Flip the chords of triangles (m, 3) with two edges on one circle; return all triangles.
 
     Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
-    by the other diagonal of the two triangles at the chord. Chords between phases, or beside voids, stay.
+    by the other diagonal of the two triangles at the chord. Chords between phases, or of one triangle, stay.
     """
     triangles = triangles.copy()
     for _ in range(8):

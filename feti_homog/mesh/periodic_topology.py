@@ -247,7 +247,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Return the distinct values (k,) of `numbers` below `size`, in ascending order, and the index of each entry."""
+    """Return the distinct `numbers` (k,), ascending and less than `size`, and the index of every entry."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))

@@ -243,7 +243,7 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
     """Bisect triangles recursively; return their leaves (t,) in a binary tree with some empty leaves.
 
-    A cut runs along x or y, near the middle of a part, and crosses the fewest sides between `neighbours` (k,), (k,).
+    A cut runs along x or y, near the middle of a part, across the fewest sides between `neighbours`, two arrays (k,).
     """
     t, first = len(centres), np.array([0, len(centres)])
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]

@@ -146,7 +146,7 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: Int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the submeshes of each rank, rank by rank; they may be empty.
+    """Yield the submeshes of each rank, in rank order; a rank without triangles has none.
 
     `subdomain` (m,) has the subdomain of each triangle, and `pinned` the keys of the pinned classes.
     """

@@ -66,7 +66,7 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """Return the centres (m, 2) of discs and images within `reach`, and the disc indices (m,).
+        """Return centres (m, 2) of discs and images within `reach` of the rectangle, and disc indices (m,).
 
         The N discs in the rectangle come first; a window has no images.
         """

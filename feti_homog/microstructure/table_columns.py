@@ -17,7 +17,7 @@ from feti_homog.microstructure.shapes.shapes import SHAPES
 from feti_homog.schema import types
 from feti_homog.system.runtime import input_files
 
-# Numeric columns, with the value of an empty cell and the bounds.
+# Numeric columns, each with the value of an empty cell and bounds.
 NUMBERS = {
     "x": ColumnRange(math.nan),
     "y": ColumnRange(math.nan),

@@ -79,6 +79,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with the fewest digits, `digits` or more, that make it at most `value`."""
+    """Write a limit with the fewest digits, `digits` or more, that do not make it exceed `value`."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

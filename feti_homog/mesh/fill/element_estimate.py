@@ -34,9 +34,9 @@ class ElementEstimate:
     Attributes:
         cell: the cell section, with element sizes.
         fibres: fibre count.
-        mean_radius: mean radius of the fibres; of fibres and voids in a table.
+        mean_radius: radius of a fibre of mean area; in a table, the mean radius of fibres and voids.
         height: cell height / cell width.
-        interfaces: total length of the interfaces.
+        interfaces: total length of the interfaces, without coatings.
         ovals: the elliptic fibres in a table.
     """
 

@@ -90,10 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, and matching nodes on opposite sides.
-
-        Raises MeshError if the sampling allows fewer nodes on sides.
-        """
+        """Make the outline from nodes on arcs and bridges, and matching nodes on sides.  Raises MeshError."""
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
         parts = [*self._sides(0), *self._sides(1)]
@@ -114,7 +111,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield nodes (n, 2) and curves of each of the two sides along `axis`, with matching nodes."""
+        """Yield nodes (n, 2) and curves of both sides along `axis`, with matching nodes.  Raises MeshError."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)

@@ -259,7 +259,7 @@ class SizedLines:
     sampling: Sampling
 
     def parts(self, count: int) -> list[SizedLines]:
-        """Divide the lines, in order, into `count` parts of equal size."""
+        """Divide the lines, in order, into `count` parts of nearly equal size."""
         bounds = (distributed_arrays.even(len(lines), count) for lines in (self.arcs, self.bridges))
         ends = zip(*map(pairwise, bounds), strict=True)
         return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]

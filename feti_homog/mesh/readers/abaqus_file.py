@@ -33,8 +33,9 @@ BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 def load(path: Path) -> RawMesh:
     """Read triangles, quadrilaterals and lines from an input file with one part.
 
-    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names, else the *ELSET, else the
-    ELSET of *ELEMENT; names become lower case unless quoted. Elements have first or second order.
+    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names (its material, if a material
+    and no set is named matrix), else the *ELSET, else the ELSET of *ELEMENT; names become lower case unless quoted.
+    Elements have first or second order.
 
     Raises:
         OSError: the file cannot be read.
@@ -103,7 +104,7 @@ class _Content:
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Read elements; ValueError for other types and wrong or repeated numbers."""
+        """Read the elements of a block; ValueError for unusable types, wrong node counts and repeated numbers."""
         if self.is_assembly:
             raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()

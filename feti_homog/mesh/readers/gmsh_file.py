@@ -160,7 +160,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
     # Wrong extreme numbers in the head of a section do no harm; "Error loading" repeats the previous message.
     passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
     with gmsh_session() as gmsh:
-        gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
+        gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # 1 would add elements between partitions
         for only_groups in (False, True):
             gmsh.clear()
             gmsh.option.setNumber("Mesh.SwitchElementTags", only_groups)

@@ -192,7 +192,7 @@ def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List side nodes without a partner on the opposite side, and sides without inner nodes."""
+    """List nodes without a partner, except on the side with fewer nodes, and sides without inner nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))

@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs: A + P r + pi r^2 (Steiner), with core area A, perimeter P, radius r."""
+        """The radii (k,) of discs of equal area A + P r + pi r^2 (Steiner), with core area A, perimeter P, radius r."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)

@@ -25,7 +25,7 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Build ellipses with semi-axes a, b (k,); a lies at `angle` (k,) in degrees."""
+        """Build ellipses with semi-axes a, b (k,); a has the direction `angle` (k,), in degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
