@@ -50,7 +50,7 @@ class CoarseMesh:
         triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
             square pixels, the lower left corner first; `refinement.halved` cuts pixels into triangles.
         phase: (m,) index into `phases`; the first phase is "matrix".
-        precedence: (m,) sort key for the numbers of constituents: 0 in the matrix, else the fibre number, or the
+        precedence: (m,) sort key for the numbers of constituents: least in the matrix, else the fibre number, or the
             phase if fibres have no numbers.
         representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.

@@ -215,7 +215,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """Return the parts (m,) of constituents, cut at the cell boundary as in Fig. 2a (`bodies = "plane"`)."""
+        """Return the part (m,) of each triangle, for constituents cut at the sides (Fig. 2a, `bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])

@@ -92,7 +92,8 @@ class ReferenceLattice:
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
         """Assign numbers (t, q) to the nodes of triangles with `vertices` (t, 3) and `edges` (t, 3).
 
-        Vertices come first, then M - 1 nodes along each edge, in reverse where `backwards` (t, 3), then inner nodes.
+        First come `n_vertices` vertices, then M - 1 nodes along each of `n_edges` edges, in reverse where `backwards`
+        (t, 3), then inner nodes.
         """
         inner = self.intervals - 1
         p = np.arange(inner)

@@ -108,7 +108,7 @@ class SubdomainTable:
 
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
-        """Make the table from the subdomain (m,) of each triangle, numbered without gaps, and the `rank` (s,)."""
+        """Make the table from the subdomain (m,) of each triangle, 0 to s - 1, and the `rank` (s,) of subdomains."""
         body = np.zeros(subdomain.max() + 1, np.int64)
         body[subdomain] = 0 if across else torus.constituent
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)

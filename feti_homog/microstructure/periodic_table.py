@@ -115,8 +115,8 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """Check the fibres of a table and place them on the torus.
 
-    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises like
-    `table_arrangement`.
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises MeshError as
+    `table_arrangement` does.
     """
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])

@@ -75,7 +75,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read one block; ValueError if the block is refused or faulty."""
+        """Read a block of nodes, elements, sets or sections, skip others; ValueError if it is refused or faulty."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:
@@ -126,7 +126,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Read the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
+        """Add the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (

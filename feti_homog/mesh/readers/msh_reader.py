@@ -71,7 +71,7 @@ def read(
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
-    """Check a raw mesh and convert it; faults begin with `path`. Raises MeshError like `read`, from shapes on."""
+    """Check a raw mesh and convert it; faults begin with `path`. Raises MeshError, see `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All triangles become counter-clockwise; middle nodes belong to edges of either direction.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0

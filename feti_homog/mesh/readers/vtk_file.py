@@ -102,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Yield name, values and width of the arrays for `length` points or cells in a section."""
+    """Yield name, values and width of the arrays in a section for `length` points or cells; skip colour tables."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -126,7 +126,7 @@ def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Itera
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read triangles and lines from a Medit file, which numbers nodes and cells from 1.
+    """Read triangles and lines, numbered from 1, from a Medit file; skip other known sections.
 
     Raises:
         OSError: the file cannot be read.
