@@ -59,7 +59,7 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Load a case from a file; the file name is the default case name.  Raises CaseError with all faults."""
+        """Load a case from a file; its default name is the file name.  Raises CaseError with all faults."""
         return cls.parse(read_document(path), Path(path).parent)
 
     @classmethod

@@ -83,7 +83,7 @@ def sized(
 
     Args:
         table: the [cell] table of the file, with or without an order.
-        free_faces: whether the cell has voids, or interfaces with soft or breaking bonds.
+        free_faces: whether the cell has voids, or the case a section [interface].
     """
     locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
     if is_given and cell.order == 1:

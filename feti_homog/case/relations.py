@@ -85,9 +85,9 @@ def stress_free(
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Read the interface sections in file order, and add faults to `reader`; return None if a section cannot be read.
+    """Read the interface sections in file order; return None for unreadable or too many sections.
 
-    Each section gets its law as `criterion`, and numbers from its branch; a contradiction only adds a fault.
+    Each section gets its law as `criterion`, and numbers from its branch. Faults, also contradictions, go to `reader`.
     """
     tables = interface_tables(document)
     if document.get("interface") == []:

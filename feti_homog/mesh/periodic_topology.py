@@ -223,7 +223,7 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """Return the nesting position (n,) of constituents by their depth (n,) in the matrix, the outermost first.
+    """Return the nesting position (n,) of constituents by their depth (n,) from the matrix, the outermost first.
 
     At equal depth, coatings precede fibres, and lower numbers precede higher numbers; `phase` (n,) indexes `phases`.
     """

@@ -226,7 +226,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     i (k,), j (k,), and the vectors (k, 2) from i to the image of j.
 
     Raises:
-        MeshError: there are more pairs than MOST_PAIRS.
+        MeshError: there are more pairs than MOST_PAIRS, by an estimate.
     """
     inside = centres % size
     images = inside + STEPS[:, None] * size

@@ -33,7 +33,7 @@ class NearestNeighbours:
 
     Attributes:
         distances: (N, k), in ascending order; infinite if a window has too few fibres.
-        directions: (N, k) degrees from x1 towards x2, in [0, 360).
+        directions: (N, k) degrees from x1 towards x2, in [0, 360); NaN at infinite distances.
         weights: (N, k), weights of the distances in their distribution; each column sums to 1.  In a periodic cell
             weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
             that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]

@@ -163,11 +163,10 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """Return the edge size on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
-    of the cell, with h_k proportional to the passage width. The mandatory `vertices` (v, 2) are also sources, with the
-    distance to the next vertex as h_k.
-
-    The size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one
-    of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
+    of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
+    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. The size
+    is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one of the
+    `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)

@@ -25,7 +25,7 @@ Marks = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Bridges:
-    """Straight lines from the first to the second disc in `ends` (b, 2), with directions `angle` (b,)."""
+    """Straight lines from the first to the second disc in `ends` (b, 2), in directions `angle` (b,), in radians."""
 
     ends: Int
     angle: Float

@@ -185,7 +185,7 @@ def cannot_debond(mesh: RawMesh, torus: Torus) -> list[str]:
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
-    """List all curves except DEBONDED in one line."""
+    """List all curves except DEBONDED in one line; () without such curves."""
     names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
     advice = f'not used; lines that are debonded from the start belong in "{DEBONDED}"'
     return tuple(_listed(f"{mesh.curve_container} ", names, str, f": {advice}"))

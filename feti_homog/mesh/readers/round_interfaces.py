@@ -33,7 +33,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. Other interfaces stay polygons.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it
+    cannot, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):

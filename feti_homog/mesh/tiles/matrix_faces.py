@@ -33,7 +33,7 @@ class CentreLines:
 
     Attributes:
         ends: (e, 2) discs.
-        angle: (e,) direction from the first to the second disc.
+        angle: (e,) direction from the first to the second disc, in radians.
         gap: (e,) distance between the circles.
         facing: (e, 2, 2) the point on each circle that faces the other circle.
         clearance: (e,) least distance between the line and the centre of a third disc / radius of that disc.

@@ -57,8 +57,8 @@ def outlines_of(rows: Columns) -> Outlines:
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
     """Replace parts of N outlines.
 
-    A part is a mask (N,) and the new outlines of the masked rows.  Returns `Discs` or `Ellipses` if the class can
-    represent all outlines, else `ConvexSums`.
+    A part is a mask (N,) and the new outlines of the masked rows.  Returns `outlines` if all masks are empty, `Discs`
+    or `Ellipses` if the class can represent all outlines, else `ConvexSums`.
     """
     parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
