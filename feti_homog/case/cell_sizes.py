@@ -108,7 +108,7 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Suggest `accuracy` if default elements for a fibre table are longer than the mean fibre radius, else []."""
+    """Suggest `accuracy` for a fibre table; [] unless default elements are longer than the mean radius."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
@@ -117,7 +117,7 @@ def default_size(cell: Cell) -> list[str]:
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return the fibre count, for tables the row count, and height / width of a cell without a user mesh."""
+    """Return fibre count and height / width of a cell without a user mesh; all rows of a table count."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width

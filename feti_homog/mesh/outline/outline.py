@@ -25,7 +25,7 @@ Marks = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Bridges:
-    """Straight lines from the first to the second disc in `ends` (b, 2), in directions `angle` (b,), in radians."""
+    """Straight lines between discs `ends` (b, 2), in the directions `angle` (b,), in radians, from the first."""
 
     ends: Int
     angle: Float
@@ -84,7 +84,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the sorted coordinates of corners and crossings of curves on the side through 0 along `axis`."""
+    """Return the coordinates of corners and curves on the side through 0 along `axis`, in ascending order."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
@@ -136,7 +136,7 @@ def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks:
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves at `vertices` into arcs of at most a quarter turn, and select the arcs in the cell.
+    """Divide curves at `vertices` into arcs in the cell, of at most a quarter turn.
 
     Returns curves (a,), and first and last parameters (a,). The arcs of a curve without vertices begin at 0.
     """

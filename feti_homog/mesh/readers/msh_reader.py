@@ -181,7 +181,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phases that select the group by name or, if none does, by alias.
+    """Rename each group to the phases that select its name or, if none does, an alias.
 
     Other groups keep their names. The entry `debonded` selects curves.
 

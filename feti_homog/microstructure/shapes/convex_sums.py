@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of discs of equal area A + P r + pi r^2 (Steiner), with core area A, perimeter P, radius r."""
+        """The radii (k,) of equal-area discs.  The area is A + P r + pi r^2 (Steiner; core area A, perimeter P)."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -60,7 +60,7 @@ class ConvexSums(ConvexCurves):
         return replace(self, frames=frames)
 
     def support(self, normal: Float) -> Float:
-        """Return the supports max_v v . n + |F^T n| (k, ...), with corners v of V, at unit vectors n (k, ..., 2)."""
+        """Return the supports (k, ...) at unit vectors n (k, ..., 2): max_v v . n + |F^T n| over corners v of V."""
         core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return the distances (n, k) at vectors (n, k, 2) from the centres, to POINTS or more points on an outline."""
+        """Return the distances (n, k) at vectors (n, k, 2) from the centres, to POINTS or more points of outlines."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
