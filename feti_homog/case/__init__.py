@@ -1,4 +1,4 @@
-"""The case file: its sections and keys, checked before anything is computed.
+"""Define, read and check a case file before anything is computed.
 
 Imports `materials`, `microstructure`, `schema` and `system`. Starts neither MPI nor PETSc.  Main entries: `cases.load`
 and `cases.parse`; `reference` describes the file.

@@ -16,11 +16,11 @@ class BondLawEntry:
         implementation: "module.Class".
         keys: keys of [interface] that this law has, but not all other laws.
         needs: keys that this law requires.
-        limits: keys, one of which must be finite for bonds to break; empty if the law always has a limit.
+        limits: keys; bonds can break if one is finite. Empty if the law always has a limit.
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
-        softens: whether the spring compliance grows before a bond breaks.
-        has_process_zone: whether elements must resolve the length along which bonds break.
+        softens: whether the spring compliance grows with damage before a bond breaks.
+        has_process_zone: whether elements must resolve the length of the zone where bonds break.
     """
 
     name: str
@@ -82,5 +82,5 @@ DEFAULT = REGISTRY[0].name
 
 
 def laws_with(key: str) -> tuple[str, ...]:
-    """Return the names of the laws that have a key of [interface]."""
+    """Return the names of the bond laws with the [interface] key `key`."""
     return tuple(entry.name for entry in REGISTRY if key in entry.keys)

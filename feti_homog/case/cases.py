@@ -59,7 +59,7 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Load a case from a file, whose name is the default case name.  Raises CaseError with all faults."""
+        """Load a case from a file; its default name is the file name.  Raises CaseError with all faults."""
         return cls.parse(read_document(path), Path(path).parent)
 
     @classmethod
@@ -69,7 +69,7 @@ class Case:
         Values may be NumPy scalars, arrays, tuples and paths, besides TOML types.
 
         Raises:
-            CaseError: with all faults.
+            CaseError: the case is faulty; one line per fault.
             TypeError: `values` is not a mapping.
         """
         document, folder = to_document(values), Path(folder)
@@ -89,7 +89,7 @@ class Case:
 
         All other keys stay as in the file or document.  A number, from 1, selects one of several sections or an entry
         of a list, as in `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12` sets
-        both symmetric entries; None removes a key.  Raises CaseError with all faults.
+        both symmetric entries; None removes a key.  Raises CaseError.
         """
         (document, folder), faults = self.source, list[str]()
         changed = with_values(document, dict(leaves(to_document(changes))), faults)
@@ -104,7 +104,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """Return the first interface; all interfaces share its contact, criterion and growth."""
+        """Return the first interface, None for perfect bonding; all share contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
@@ -114,7 +114,7 @@ class Case:
 
     @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
-        """Return the loads of the case with all components.
+        """Return the loads of the case with all components; () if the section gives no loads.
 
         A load maps names to values: the strain or stress of each component in Voigt order and, in generalized plane
         strain, the temperature.  The unloaded start of a path is left out.
@@ -123,19 +123,16 @@ class Case:
 
     @property
     def section(self) -> AnalysisSection:
-        """Return the section that belongs to the analysis type."""
+        """Return the section of the analysis; `Stiffness()` for types without a section."""
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase. Raises KeyError.
-
-        A phase "fibre:2" without a section has the material of "fibre".
-        """
+        """Return the material of a phase; "fibre:2" without a section has the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property
     def fewer_events(self) -> str:
-        """Return advice on the key that gives a damage path fewer events; empty for other cases."""
+        """Return the end of a message: advice for fewer events on a damage path; empty for other cases."""
         has_events = self.path is not None and self.path.method == "events"
         if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
             return ""
@@ -184,7 +181,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.
 
-        Name, PETSc options and max_events are left out; without `with_output`, [output] is left out, too.
+        Name, PETSc options and max_events are left out, also [output] without `with_output`; files count by content.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
@@ -207,9 +204,9 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Read all sections of a document, and return the contents and all faults.
+    """Read all sections of a document; return the fields of `Case`, and all faults.
 
-    Without a folder, the files of [cell] remain unread.
+    A faulty section is None. Without a folder, the cell is None, and its files remain unread.
     """
     analysis = document.get("analysis")
     if isinstance(analysis, dict) and analysis.get("type") == "conductivity":
@@ -269,13 +266,13 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
 @lru_cache
 def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str | None], ...]) -> list[Rule]:
-    """Select the rules for the sections `names` whose conditions `selected` meets."""
+    """Select the rules for the document and the sections `names` with conditions that `selected` meets."""
     rules = (rule for rule in RULES if not rule.path or rule.path[0] in names)
     return [rule for rule in rules if all(condition.holds(dict(selected)) for condition in rule.when)]
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section into a dataclass; return None for a faulty or absent section."""
+    """Read a section into a dataclass, with defaults if it may be absent; None if faulty or missing."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

@@ -26,7 +26,7 @@ LEFT_OUT = 0.01
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Read the files of a cell into its section, and append all faults to `faults`."""
+    """Return the cell with absolute file names and the contents of tables; append all faults to `faults`."""
     cell = _with_match(cell, folder, faults)
     faults += size_faults(cell)
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
@@ -53,9 +53,9 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Read the window that a random cell matches, and append faults to `faults`.
+    """Return a random cell with the window that it matches; append faults to `faults`.
 
-    If the cell gives no fibre count or no fibre fraction, the window provides the value.
+    The window provides a missing fibre count or fraction. Without a readable window, the cell does not change.
     """
     if cell.match is None:
         return cell
@@ -63,7 +63,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure import fibre_pattern, random_fibres  # import SciPy's trees, which few cases need
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # few cases need SciPy's trees
 
     try:
         window = fibre_pattern.read_window(file)
@@ -80,8 +80,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """Read the fibre table of a cell, with the cell size, and append faults to `faults`."""
-    from feti_homog.microstructure import fibre_table  # which few cases need
+    """Return a cell with its fibre table, unchanged if the table is not readable; append faults to `faults`."""
+    from feti_homog.microstructure import fibre_table  # few cases need it
     from feti_homog.microstructure.shapes import shapes
 
     try:
@@ -130,7 +130,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
     """Append the faults of shapes and hollow fibres to `faults`."""
-    from feti_homog.microstructure.shapes import shapes  # which few cases need
+    from feti_homog.microstructure.shapes import shapes  # few cases need it
 
     rows, before = table.columns, len(faults)
     _tell(table, shapes.have_both_sizes(rows), shapes.BOTH_SIZES, faults)

@@ -276,7 +276,7 @@ class Cell:
 
     @property
     def has_voids(self) -> bool:
-        """Return whether the cell has voids, as far as the case tells without a user's mesh."""
+        """Return whether the case has voids or hollow fibres, apart from voids in images."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 

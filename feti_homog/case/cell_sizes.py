@@ -24,12 +24,12 @@ ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
-    """Return whether a material has mixed elements in the plane problem."""
+    """Return whether elements of an order are mixed elements for a material in a plane state."""
     return order == 2 and voigt.PLANE_STATES[plane].locks and laws.isotropic_ratio(material) is not None
 
 
 def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases so close to incompressible that rounding may fail the checks, one per line."""
+    """List nearly incompressible phases, for which checks may fail by rounding, one per line."""
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
@@ -54,7 +54,7 @@ def _above(limit: float, materials: Mapping[str, material_forms.Material], plane
 
 
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
-"""Keys that the key `accuracy` determines, and therefore excludes."""
+"""Keys that the key `accuracy` determines and excludes."""
 
 # By element order, the error of the coarsest mesh with stiff inclusions / (kappa beta^2), and the factor by which soft
 # inclusions raise this error: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
@@ -76,14 +76,14 @@ def sized(
     """Set mesh size, refinement and element order of a cell by its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
-    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Faults are added to
-    `faults`: r above MOST_REFINED, and a given linear order whose elements lock. The coarsest elements have half the
-    fibre distance of a square lattice with as many fibres, to two digits, and at most half the width: circles and
-    gaps have smaller elements, so that coarser meshes would hardly have fewer elements.
+    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Without an accuracy, only the
+    order is set, to 2 if linear elements lock. Faults are added to `faults`: r above MOST_REFINED, and a locking order.
+    The coarsest elements have half the fibre distance of a square lattice with this fibre count, to two digits, and at
+    most half the width: with smaller elements at circles and gaps, coarser meshes hardly have fewer elements.
 
     Args:
         table: the [cell] table of the file, with or without an order.
-        free_faces: whether the cell has voids, or interfaces with soft or breaking bonds.
+        free_faces: whether the cell has voids, or the case a section [interface].
     """
     locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
     if is_given and cell.order == 1:
@@ -108,7 +108,7 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Suggest `accuracy` if the default elements for a fibre table are longer than the mean radius."""
+    """Suggest `accuracy` for a fibre table; [] unless default elements are longer than the mean radius."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
@@ -117,7 +117,7 @@ def default_size(cell: Cell) -> list[str]:
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return the fibre count and the ratio height / width of a cell without a user mesh."""
+    """Return fibre count and height / width of a cell without a user mesh; all rows of a table count."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width
@@ -126,12 +126,11 @@ def fibres_and_height(cell: Cell) -> tuple[int, float]:
 
 
 def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:
-    """Return an upper estimate of the relative strain energy error on the coarsest mesh,
+    """Estimate the relative strain energy error on the coarsest mesh from above.
 
-        C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
-
-    where lambda are the eigenvalues of a phase stiffness relative to the stiffness around the phase, 0 at free faces;
-    s is SOFT_FACTOR where lambda < 1 and 1 elsewhere; kappa is the largest condition number of a plane stiffness.
+    The estimate is C_p kappa max s beta^2 with beta = |lambda - 1| / (lambda + 1) and C_p = COARSE_ERROR of `order` p.
+    lambda are the eigenvalues of a phase stiffness relative to the stiffness around the phase, 0 at free faces; s is
+    SOFT_FACTOR where lambda < 1 and 1 elsewhere; kappa is the largest condition number of a plane stiffness.
     MIXED_CONDITION bounds kappa in mixed elements, and kappa s if all elements are mixed.
     """
     stiffness = {phase: laws.stiffness_of(material, plane) for phase, material in materials.items()}
@@ -191,7 +190,7 @@ def fractions_in_words(cell: Cell) -> str:
 def mixed_width(cell: Cell) -> float | None:
     """Return the cell width, or None if it follows from `fibre_radius` or is the default.
 
-    With radii and a fibre count, W^2 = sum n_p pi r_p^2 / sum c_p.
+    With radii and a fibre count, W^2 = sum n_p pi r_p^2 / sum c_p, with symbols as in `fibre_counts`.
     """
     if cell.radii is None or cell.fibres is None:
         return cell.width

@@ -11,7 +11,7 @@ from feti_homog.schema import key, types
 
 T = TypeVar("T")
 pair_key = partial(key, by_pair=True)
-"""Make a key in which several [[interface]] sections may differ; they agree in all other keys."""
+"""Make a key that may have a value for each [[interface]] section; all other keys have one value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,7 +255,7 @@ class InterfaceSection:
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:
-    """Return all [interface] sections of a document as a list."""
+    """Return the [interface] sections of a document, unchecked, as a list; [] without any."""
     given = document.get("interface", [])
     return given if isinstance(given, list) else [given]
 

@@ -88,7 +88,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """Return the index of the first load that names a component, by stress name; by default len(loads)."""
+    """Return the first load that names each component, by stress: an index, or len(loads) without such a load."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components
@@ -122,7 +122,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for unit loads; one-sided contact needs both signs."""
+        """Return the number of solves for a number of unit `loads`; one-sided contact needs both signs."""
         return 2 * loads if one_sided else loads
 
 
@@ -156,7 +156,7 @@ class Angle(AnalysisSection):
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for all openings."""
+        """Return the number of solves: for each opening, one under `strain`, or one for each unit load."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 

@@ -66,7 +66,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell | None, materials: object) -> list[str]:
-    """List coatings without a material, and coating materials without a coating."""
+    """List coatings without a material, and a coating material without coatings; [] for a user's mesh."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None
@@ -84,7 +84,7 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
 def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
-    """Read the material of a section, in the form that the keys select; None if faulty."""
+    """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
     given: dict[str, list[str]] = {}
     for name, (form, *further) in FORMS_OF.items():
         if isinstance(table, dict) and name in table and not further:
@@ -129,5 +129,5 @@ def missing_expansions(materials: Mapping[str, material_forms.Material], needed_
 
 
 def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:
-    """Return the phase that provides the material: the phase itself, or "fibre" for "fibre:2"."""
+    """Return the phase that provides the material: the phase itself or, for "fibre:2" without a section, "fibre"."""
     return phase if phase in materials else phase.partition(":")[0]

@@ -54,6 +54,7 @@ class TableReference:
     Attributes:
         section: name of the section: "cell", "material", ...; "name" for the key before the first section.
         place: position in the file: "[cell]", "[material.PHASE], isotropic", ...
+        meaning, rows: purpose of the table, and its keys.
     """
 
     section: str
@@ -86,9 +87,10 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
-    """Return the key tables: all in `ORDER`, one section, or all with a word.
+    """Return the key tables: all in `ORDER`, the tables of a section, or tables with a `word`.
 
-    The search covers names and descriptions of keys and sections; it ignores case, and treats underscores as spaces.
+    The search in names and descriptions of keys and sections ignores case, and treats underscores as spaces. A table
+    has only the keys with the word, unless its name has the word.
 
     Raises:
         CaseError: no key or section has the word, and `results`, the lines on results with the word, is empty.
@@ -129,7 +131,7 @@ def _has(word: str, *texts: str) -> bool:
 
 
 def text(word: str = "", results: Sequence[str] = ()) -> str:
-    """Write the reference with an index of keys by need; with a word, only tables with it and lines of `results`."""
+    """Write the reference with an index by need or, with a `word`, its tables and `results`.  Raises CaseError."""
     references = tables(word, results)
     if word:
         described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)

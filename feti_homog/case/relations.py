@@ -61,7 +61,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a remark on axes that a user could mistake for ply axes, only in generalized plane strain."""
+    """Return a remark, in generalized plane strain, on axes that users could take for ply axes; () without any."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
@@ -85,9 +85,9 @@ def stress_free(
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Read the interface sections in file order, and add faults to `reader`; return None if a section cannot be read.
+    """Read the interface sections in file order; return None for unreadable or too many sections.
 
-    Each section gets its law as `criterion`, and numbers from its branch; a contradiction only adds a fault.
+    Each section gets its law as `criterion`, and numbers from its branch. Faults, also contradictions, go to `reader`.
     """
     tables = interface_tables(document)
     if document.get("interface") == []:
@@ -129,7 +129,7 @@ def _written(value: Any) -> str:
 
 
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
-    """Derive missing normal stiffness, strength and toughness from a softening branch.
+    """Derive missing normal stiffness, strength and toughness from a softening branch; {} without a valid branch.
 
     The branch begins at its peak, with opening delta_1 and traction t_1: k_n = t_1 / delta_1, N = t_1, and G_n is the
     area under the elastic line and the branch.

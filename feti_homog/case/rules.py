@@ -38,7 +38,7 @@ class Rule:
     """A requirement on the value at a document path, under some conditions.
 
     Attributes:
-        path: from the section to a table or value; the rule holds if nothing is there. Empty: the whole document.
+        path: names from the section to a table or value; the rule holds without a value. Empty: the whole document.
         holds: test of the value; None if the path must not have a value.
         words: end of the fault line: the expectation, or a function of value and selection that returns this end.
         when: conditions; the rule applies if all hold.
@@ -83,14 +83,14 @@ def has(table: Any, *names: str) -> bool:
 
 
 def exclusive(path: TablePath, *names: str, words: str = "exclude each other; give one") -> Rule:
-    """Return the rule that a table has at most one of these keys."""
+    """Return the rule that a table at `path` has at most one of the keys `names`."""
     return Rule(path, lambda table: sum(has(table, name) for name in names) < 2, words, names=names)
 
 
 def needed(
     path: TablePath, name: str, words: str, *when: keys.Condition, beside: str = "", unless: Sequence[str] = ()
 ) -> Rule:
-    """Return the rule that a table has a key, or one of its substitutes.
+    """Return the rule that a table at `path` has the key `name`, or one of the keys `unless`.
 
     The rule applies under the conditions `when` and, if a key `beside` is given, only to tables with this key.
     """
@@ -105,9 +105,9 @@ def needed(
 def belonging(
     path: TablePath, condition: keys.Condition, values: Sequence[str], *when: keys.Condition, instead: str = ""
 ) -> Rule:
-    """Return the rule that refuses a key or section unless a condition holds.
+    """Return the rule that refuses the key or section at `path` unless `condition` holds.
 
-    `values` are all values of the condition's selector; `instead` names a replacement.
+    The rule applies under the conditions `when`. `values` are all values of the selector; `instead` is a replacement.
     """
     others = tuple(value for value in values if value not in condition.values)
 

@@ -245,8 +245,8 @@ class SectionTable:
     """A table of the case file.
 
     Attributes:
-        section: name of its section.
-        place: position in the file, in words, with the form if there are several.
+        section: section name.
+        place: position in the file, in words; for a material with its form.
         contents: dataclass with the table keys.
     """
 
@@ -281,7 +281,7 @@ KEY_OWNERS = {
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """Read PETSc options by name; the run itself checks options with the prefix feti_."""
+    """Return the options in [petsc], {} for other values, and append faults; runs check the values of options."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}

@@ -24,7 +24,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Read a TOML document, whose default name is the file name.  Raises CaseError."""
+    """Read a TOML document; its default `name` is the file name without suffix.  Raises CaseError."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -61,7 +61,7 @@ def to_document(values: object) -> dict[str, Any]:
 
     Raises:
         TypeError: the values are not a mapping.
-        CaseError: a key is not a string, an integer is too large for messages, or a table is too long or too deep.
+        CaseError: a key is not a string, an integer is too large for messages, or a table or list is too long or deep.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
@@ -76,7 +76,7 @@ def to_document(values: object) -> dict[str, Any]:
 
 def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> Any:
     if type(value) in (float, str, bool) or (type(value) is int and value.bit_length() <= MAX_BITS):
-        return value  # most values; other types, such as those of NumPy, follow
+        return value  # most values; other types, such as NumPy scalars, follow
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, Mapping | list | tuple):
@@ -114,7 +114,7 @@ def leaves(
 
 
 def in_lists(path: TomlPath) -> TomlPath:
-    """Split the last name Cij of a stiffness path into row and column."""
+    """Split the last name Cij of a stiffness path into row and column; other paths do not change."""
     entry = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == ("stiffness",) else None
     return path if entry is None else (*path[:-1], *entry.groups())
 
@@ -125,8 +125,8 @@ def with_values(
     """Return a copy of a document with other values at some paths.
 
     A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
-    of several sections or an entry of a list; Cij stands for both entries of a stiffness.  Faults, which begin with
-    `place`, are appended to `faults`.
+    of several sections or an entry of a list; Cij stands for both entries of a stiffness.  The first fault, which
+    begins with `place`, is appended to `faults`, and later values are left out.
     """
     document = copy.deepcopy(dict(base))
     for path, value in values.items():
@@ -160,7 +160,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the only entry of a list, unless `name` is a section number; else return `table` itself."""
+    """Return the only entry of a list `table`: a list or, unless `name` is a number, a table; else return `table`."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 
@@ -171,7 +171,7 @@ def short_digest(content: bytes) -> str:
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return the items of a table, and report every key that is not a string."""
+    """Return the items of a table with string keys; every other key adds a line to `faults`."""
     wrong = [name for name in table if not isinstance(name, str)]
     if wrong:
         place = f"[{wording.dotted_key(path)}] " if path else ""

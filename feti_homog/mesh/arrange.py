@@ -9,15 +9,15 @@ from feti_homog.errors import MeshError
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
 from feti_homog.schema import types
 
-# Quenched random packings jam near this area fraction.
+# Random packings of discs jam near this area fraction.
 JAMMED = 0.84
 
 
 def arrange(cell: cell_section.Cell) -> Arrangement:
-    """Arrange fibres in a cell of width 1, with the exact fractions `cell.fractions`.
+    """Arrange the fibres and voids of a generated cell; the arrangement has the width 1.
 
-    A lattice comes from `cell_section.LATTICES`, a random cell from `random_arrangement` or, with `cell.match`, from
-    `matched_arrangement`, and a table from `periodic_table.table_arrangement`.
+    Lattices and random cells (`random_arrangement` or, with `cell.match`, `matched_arrangement`) have the exact
+    fractions `cell.fractions`; `periodic_table.table_arrangement` arranges tables.
 
     Raises:
         MeshError: discs touch or are too many, the search for an arrangement fails, or the table is faulty.
@@ -44,11 +44,11 @@ def random_arrangement(
 ) -> Arrangement:
     """Place discs at random on the unit torus; every machine finds the same discs.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; all voids have
-    one radius. The gap between any two discs, with coatings and images, is at least `min_gap` mean fibre diameters. For
-    discs grown by half the gap, a descent from random centres reduces the overlap energy
-    1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 to zero. After `max_steps`, the descent restarts from other centres, in up
-    to `max_attempts` attempts (default: 10 for few fibres, 3 for many). Finally, `clear_shift` moves the arrangement.
+    Fibre radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, scaled to the phase fractions; voids have one
+    radius. Gaps between discs, with coatings and images, are at least `min_gap` mean fibre diameters. A descent from
+    random centres x_i reduces the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 to zero; R_i includes the
+    coating and half the gap. After `max_steps` (default: `random_fibres.MAX_STEPS`), it restarts, in up to
+    `max_attempts` attempts (default: 10 for few discs, 3 for many). Finally, `clear_shift` moves the arrangement.
 
     Raises:
         MeshError: the discs are too many or too dense, or the search for an arrangement fails.
@@ -91,9 +91,10 @@ def random_arrangement(
 def matched_arrangement(cell: cell_section.Cell) -> Arrangement:
     """Place discs at random, with the neighbour distances of a measured window.
 
-    The radii are quantiles of the window `cell.matched`, in random order and scaled to the fraction. The first centres
+    Quantiles of the radii in the window `cell.matched`, in random order, are scaled to the fraction. The first centres
     are random, with gaps of at least `min_gap` mean diameters between discs or coatings. Then `random_fibres.matched`
-    moves fibres one by one, until the distances of the two nearest neighbours have the distribution of the table.
+    moves fibres one by one, until the distances to the two nearest neighbours are distributed as in the window, or the
+    moves run out. Finally, `clear_shift` moves the arrangement.
 
     Raises:
         MeshError: the search for an arrangement fails.

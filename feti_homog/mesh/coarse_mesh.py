@@ -1,4 +1,4 @@
-"""Represent the coarse periodic mesh of a rectangular cell on rank 0, with interface and void edges."""
+"""Represent the coarse mesh of a rectangular cell, with periodic images of nodes and edges on interfaces."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
-    """Return whether edges with `ends` (k, 2, 2) lie on a side of the rectangle [0, width] x [0, height]."""
+    """Return the mask (k,) of edges (k, 2, 2), or points (k, 1, 2), on the sides of a rectangle [0, `size`]."""
     return np.asarray(((ends == 0).all(axis=1) | (ends == size).all(axis=1)).any(axis=1))
 
 
@@ -28,7 +28,7 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
     Yields:
         The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
-        period, both in ascending order along the side.  Points beside voids that have no partner are left out.
+        period, both in ascending order along the side.  Points without a partner, as beside voids, are left out.
     """
     for axis in (0, 1):
         along = points[:, 1 - axis]
@@ -42,15 +42,15 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """A conforming periodic mesh of straight triangles, on rank 0 only.
+    """A conforming mesh of straight triangles or square pixels.
 
     Attributes:
         width, height: cell periods.
         points: (n, 2) nodes in the plane.
         triangles: (m, 3) counter-clockwise nodes; a triangle has at most one edge on a circle.  Or (m, 4) corners of
-            square pixels, the lower left corner first, from which `refinement.halved` makes triangles.
-        phase: (m,) index into `phases`, whose first name is "matrix".
-        precedence: (m,) sort key by which constituents are numbered: 0 in the matrix, else the fibre number, or the
+            square pixels, the lower left corner first; `refinement.halved` cuts pixels into triangles.
+        phase: (m,) index into `phases`; the first phase is "matrix".
+        precedence: (m,) sort key for the numbers of constituents: least in the matrix, else the fibre number, or the
             phase if fibres have no numbers.
         representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
@@ -61,7 +61,7 @@ class CoarseMesh:
         snapped: largest move of a node in a user's mesh to make opposite sides match.
         origin: lower left corner of the cell in the coordinates of the user.
         remarks: one line for each difference between cell and fibre table; unused curves in a user's mesh.
-        boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only the first has images of nodes.
+        boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only periodic nodes have images.
         centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then
             the coatings in the same order.
     """
@@ -95,13 +95,13 @@ class CoarseMesh:
         return self.period if self.boundary == "periodic" else np.full(2, 1e30)
 
     def scaled(self, factor: float) -> "CoarseMesh":
-        """Return the mesh with all lengths times `factor`."""
+        """Return the mesh with size, points and ellipses times `factor`; `origin`, `centres` and `snapped` stay."""
         mesh = replace(self, width=factor * self.width, height=factor * self.height, points=factor * self.points)
         return replace(mesh, ellipses=self.ellipses.scaled(factor))
 
     @property
     def circles(self) -> Float:
-        """The centre and radius (k, 3) of each ellipse, NaN for ellipses that are not round."""
+        """The centre and radius (k, 3) of each ellipse; the radius is NaN unless the ellipse is round."""
         return self.ellipses.circles
 
 
@@ -113,7 +113,7 @@ def areas(points: Float, triangles: Int32) -> Float:
 
 
 def edges(triangles: Int32) -> Int32:
-    """List the directed edges (3m, 2) or (4m, 2); edge 3 t + i is opposite to corner i of triangle t."""
+    """List the directed edges (3m or 4m, 2); row 3 t + i, for pixels 4 t + i, joins corners i + 1 and i + 2 of t."""
     return np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
 
 
@@ -131,10 +131,10 @@ def twins(keys: Int) -> tuple[Int, Int]:
 
 
 def representatives(points: Float, width: float, height: float) -> Int32:
-    """Return the representative (n,) of each node, for sides that match exactly.
+    """Return the representative (n,) of each node on the torus.
 
-    The representative is the partner at x = 0 for nodes at x = width, the partner at y = 0 for nodes at y = height, and
-    the origin for all four corners.
+    The partner at x = 0 represents a node at x = width, the partner at y = 0 a node at y = height, and the origin all
+    four corners. Every other node represents itself.
     """
     result = np.arange(len(points), dtype=np.int32)
     for _, low, high in paired_sides(points, np.array([width, height])):
@@ -143,10 +143,10 @@ def representatives(points: Float, width: float, height: float) -> Int32:
 
 
 def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
-    """Flip the chords of triangles (m, 3) that have two edges on one circle.
+    """Flip the chords of triangles (m, 3) with two edges on one circle; return all triangles.
 
     Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
-    by the other diagonal of the quadrilateral around the chord.
+    by the other diagonal of the two triangles at the chord. Chords between phases, or of one triangle, stay.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -169,7 +169,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find triangles with two edges on one circle, and the corner between the two edges."""
+    """Find the triangles (b,) with two edges on one circle, and the corner (b,) between the two edges."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

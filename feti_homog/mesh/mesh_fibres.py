@@ -17,13 +17,13 @@ SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
-    """Unwrap a submesh from the torus by a walk through the triangles.
+    """Unwrap a connected submesh from the torus by a walk through the triangles.
 
-    The walk closes if every class has a unique unwrapped position. Only then can the submesh rotate: a submesh that
+    The submesh is contractible if every class has a unique unwrapped position. Only then can it rotate: a submesh that
     winds around the torus cannot.
 
     Returns:
-        Shifts (t, 2) of the triangles by whole periods; true if the submesh is contractible.
+        Shifts (t, 2) of the triangles by whole periods, and whether the submesh is contractible.
     """
     if len(submesh.class_keys) == len(submesh.points):
         # No two vertices are images of each other: the plane positions are unwrapped.
@@ -60,7 +60,7 @@ def fibre_circles(torus: Torus) -> Float:
     """Return centre and radius (constituents, 3) of each fibre's outer circle, in any periodic image.
 
     Fibres that are not round have the radius NaN, and the centre in `CoarseMesh.centres` or else the area centroid. The
-    centre is NaN for the matrix, and for fibres that wind around the torus.
+    centre is NaN for the matrix, and for fibres without a listed centre that wind around the torus.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
@@ -89,7 +89,7 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def fibre_frames(torus: Torus) -> Float:
-    """Return the frame F (constituents, 2, 2) of the outer ellipse c + F p, |p| = 1, of each fibre.
+    """Return the frame F (constituents, 2, 2) of each fibre's outer ellipse: points c + F p, |p| = 1, centre c.
 
     The frame is NaN for the matrix, and for fibres with a boundary that is not on concentric ellipses.
     """
@@ -103,7 +103,7 @@ def fibre_frames(torus: Torus) -> Float:
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     """Find the fibres (k,) with boundaries on concentric ellipses.
 
-    Also returns an edge (k,) on the largest ellipse of each fibre, and whether all ellipses of a fibre are round (k,).
+    Also returns a plane edge (k,) on the largest ellipse of each fibre, and the mask (k,) of round fibres.
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
@@ -122,9 +122,10 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """Return numbers (constituents,), from 1 for fibres and coatings, 0 in the matrix, and the mask of fibres.
+    """Return the numbers (constituents,) of fibres and coatings, and the mask (constituents,) of fibres.
 
-    A coating has the lowest number of the fibres in it; a coating without a fibre counts as a fibre.
+    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of the fibres in it; without any, it is
+    a fibre itself.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]

@@ -34,7 +34,7 @@ class Torus:
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) whether a torus edge bounds a void, with only one triangle in the whole cell.
+        at_void: (torus edges,) mask of edges at voids: one triangle in the whole cell, not on sides without images.
         is_whole: whether no triangle in the cell is missing.
     """
 
@@ -79,7 +79,7 @@ class Torus:
 
     @cached_property
     def sides(self) -> tuple[Int, Int, Int]:
-        """The two triangles (e,) and (e,) beside each shared torus edge, and the number (e,) of the edge."""
+        """The two triangles (k,) and (k,) beside each shared torus edge, and the number (k,) of the edge."""
         edge = np.flatnonzero(np.bincount(self.triangle_torus_edges.ravel()) == 2)
         return *edge_pairs(self.triangle_torus_edges), edge
 
@@ -92,7 +92,7 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the ends (k, 2) of `chosen` torus edges; on cell sides, of the left or lower copy."""
+        """Return the ends (k, 2) of torus edges in the mask `chosen`; on cell sides, of the left or lower copy."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 
@@ -155,8 +155,8 @@ class Torus:
     def touching(self) -> Bool:
         """The mask (classes,) of classes where two constituents meet more than once, or without a common edge.
 
-        At an ordinary interface node, each of two constituents fills one sector of the surrounding triangles.  Tiles
-        tear only round fibres, which touch nowhere.
+        At an ordinary interface node, each of two constituents fills one sector of the surrounding triangles.  Without
+        the whole cell, all entries are False: such meshes have only round fibres, which touch nowhere.
         """
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
@@ -171,7 +171,7 @@ class Torus:
 
     @cached_property
     def never_part(self) -> Bool:
-        """The mask (classes,) of inseparable classes, where three constituents meet or two touch."""
+        """The mask (classes,) of inseparable classes, where three or more constituents meet, or two touch."""
         return np.asarray((self.meeting > 2) | self.touching)
 
     @cached_property
@@ -205,7 +205,7 @@ class Torus:
     def nesting(self) -> Int:
         """The position (constituents,) of each constituent in the order from the outermost to the innermost.
 
-        The distance from the matrix, counted in constituents, comes first; `places_by_depth` decides ties.
+        The order is by distance from the matrix, counted in constituents; `places_by_depth` decides ties.
         """
         one, other, _ = self.sides
         a, b = self.constituent[one], self.constituent[other]
@@ -215,7 +215,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """Cut the constituents (m,) at the cell boundary, as in Fig. 2a of the paper (`bodies = "plane"`)."""
+        """Return the part (m,) of each triangle, for constituents cut at the sides (Fig. 2a, `bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])
@@ -223,16 +223,16 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """Return the nesting position (n,) of constituents with depths (n,) in the matrix, the outermost first.
+    """Return the nesting position (n,) of constituents by their depth (n,) from the matrix, the outermost first.
 
-    At equal depth, coatings precede fibres, and lower numbers precede higher numbers; `phase` (n,) has phase numbers.
+    At equal depth, coatings precede fibres, and lower numbers precede higher numbers; `phase` (n,) indexes `phases`.
     """
     coats = np.array([name == phase_names.COATING for name in phases])[phase]
     return np.argsort(np.lexsort((~coats, depth)))
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
-    """Find the two triangles beside each shared edge, in the order of the edges."""
+    """Find the two triangles (k,) and (k,) beside each shared edge, in ascending order of edges."""
     edges, sides = triangle_edges.ravel(), np.arange(triangle_edges.size)
     first, last = np.zeros((2, edges.max(initial=-1) + 1), np.int64)
     first[edges[::-1]], last[edges] = sides[::-1], sides
@@ -247,7 +247,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Compress numbers below `size` to distinct ascending numbers (k,); also return the index of each entry."""
+    """Return the distinct `numbers` (k,), ascending and less than `size`, and the index of every entry."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))
@@ -260,7 +260,7 @@ def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
 
 
 def renumber(label: Int, order: Int) -> Int:
-    """Renumber labels by the first appearance in `order`."""
+    """Renumber labels (n,) by their first appearance in the permutation `order` (n,)."""
     first = np.empty(label.max(initial=-1) + 1, np.int64)
     first[label[order[::-1]]] = np.arange(len(order))[::-1]
     return np.asarray(np.argsort(np.argsort(first))[label])

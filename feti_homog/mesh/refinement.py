@@ -47,7 +47,7 @@ class ReferenceLattice:
 
     @classmethod
     def of(cls, refine: int, order: int) -> ReferenceLattice:
-        """Return the lattice of `refine` halvings for elements of the given order (1 or 2)."""
+        """Return the lattice of `refine` halvings for elements of the `order` 1 or 2."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
         for _ in range(refine):  # child i keeps corner i, the last is in the middle
@@ -90,7 +90,11 @@ class ReferenceLattice:
         return np.asarray(number[i, j])
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
-        """Assign numbers (t, q) to the nodes: vertices, then M - 1 nodes along each edge, then inner nodes."""
+        """Assign numbers (t, q) to the nodes of triangles with `vertices` (t, 3) and `edges` (t, 3).
+
+        First come `n_vertices` vertices, then M - 1 nodes along each of `n_edges` edges, in reverse where `backwards`
+        (t, 3), then inner nodes.
+        """
         inner = self.intervals - 1
         p = np.arange(inner)
         along = np.where(backwards[..., None], inner - 1 - p, p)
@@ -128,9 +132,9 @@ class FineMesh:
 
 
 def halved(pixels: Submesh) -> Submesh:
-    """Cut pixels (t, 4) into triangles (2t, 3) by diagonals between nodes with an even sum of row and column.
+    """Cut pixels (t, 4) into triangles (2t, 3).
 
-    A submesh of triangles remains as it is.
+    Diagonals join nodes with an even sum of row and column. A submesh of triangles is returned unchanged.
     """
     corners, m = pixels.triangles, len(pixels.triangles)
     if corners.shape[1] == 3:
@@ -156,9 +160,9 @@ def halved(pixels: Submesh) -> Submesh:
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     """Refine a subdomain, with new nodes of curved edges on the circles and ellipses.
 
-    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s) with barycentric coordinates b_k: on the edge from a to c, delta
-    is the offset of the arc from the chord at s = b_c / (b_a + b_c), and o is the opposite vertex.  Mid-edge nodes of
-    quadratic elements are midpoints except on arcs, so that only elements at an arc are curved.
+    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s) with corners x_k, barycentric coordinates b_k: on the edge from a
+    to c, delta is the offset of the arc from the chord at s = b_c / (b_a + b_c), and o is the opposite corner.
+    Mid-edge nodes of quadratic elements are midpoints except on arcs, so that only elements at an arc are curved.
     """
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
@@ -207,7 +211,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Return the class of the node at `position`, from 1 to lattice.intervals - 1, on a torus edge of the rank."""
+    """Return the class of a node on a torus `edge`: number `position`, 1 to M - 1, after `n_classes` vertices."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 
@@ -238,9 +242,9 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
-    """Bisect the triangles recursively; return leaf numbers (t,) of a binary tree with some empty leaves.
+    """Bisect triangles recursively; return their leaves (t,) in a binary tree with some empty leaves.
 
-    A cut runs along x or y, near the middle of a part, and crosses the fewest sides between `neighbours`.
+    A cut runs along x or y, near the middle of a part, across the fewest sides between `neighbours`, two arrays (k,).
     """
     t, first = len(centres), np.array([0, len(centres)])
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]

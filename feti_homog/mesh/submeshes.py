@@ -12,7 +12,7 @@ from feti_homog.mesh.coarse_mesh import on_sides
 from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
-# The arrays, except index arrays, with one row per triangle, per vertex, per plane edge, per class, per torus edge.
+# Arrays of `Submesh` that are no index arrays, with one row per triangle, vertex, plane edge, class or torus edge.
 ROWS = (
     ("constituent",),
     ("points",),
@@ -42,13 +42,13 @@ class Submesh:
         turns: (e,) increment of the ellipse parameter along each edge; 0 for straight edges.
         vertex_class: (v,) class of each vertex.
         edge_class: (e,) torus edge of each plane edge.
-        at_void: (torus edges,) whether a torus edge bounds a void, with only one triangle in the whole cell.
+        at_void: (torus edges,) whether a torus edge bounds a void, as in `Torus.at_void`.
         debonded: (torus edges,) whether a torus edge is debonded from the start.
         touching: (classes,) as in `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
         pinned: local numbers of the classes that do not move: one class, against translations of the cell, Eq. (15),
-            or all classes on the cell sides.
+            all classes on the cell sides, or none.
         boundary: conditions on the sides, as in `CoarseMesh`.
     """
 
@@ -108,7 +108,7 @@ class SubdomainTable:
 
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
-        """Make the table of a cell from the subdomain (m,) of each triangle, numbered without gaps."""
+        """Make the table from the subdomain (m,) of each triangle, 0 to s - 1, and the `rank` (s,) of subdomains."""
         body = np.zeros(subdomain.max() + 1, np.int64)
         body[subdomain] = 0 if across else torus.constituent
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
@@ -146,7 +146,7 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: Int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the submeshes of each rank.
+    """Yield the submeshes of each rank, in rank order; a rank without triangles has none.
 
     `subdomain` (m,) has the subdomain of each triangle, and `pinned` the keys of the pinned classes.
     """
@@ -160,7 +160,7 @@ def cut_for_ranks(
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
-    """Yield one submesh without a pinned class for each constituent of triangles `members` (m,)."""
+    """Yield one submesh, without a pinned class, for each constituent among the triangles `members` (k,)."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
     everything = _whole(torus, np.zeros(0, np.int64))
@@ -169,7 +169,7 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """Restrict a submesh to the coarse triangles `members` (m,)."""
+    """Restrict a submesh to the coarse triangles `members` (k,)."""
     vertices, triangles = present(submesh.triangles[members], len(submesh.points))
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
@@ -188,10 +188,10 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_classes(torus: Torus) -> Int:
-    """Return the keys of the pinned classes: one class, all classes on sides that move by E x, or none with tractions.
+    """Return the keys of the pinned classes: one in a periodic cell, all on displaced sides, none with tractions.
 
-    The one class of a periodic cell, Eq. (15), lies inside the matrix, nearest to a corner. On an interface, it would
-    join both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts u*.
+    The one class, Eq. (15), lies inside the matrix if possible, nearest to a corner. On an interface, it would join
+    both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts the fluctuation.
     """
     if torus.mesh.boundary != "periodic":
         nodes = on_sides(torus.mesh.points[:, None], torus.mesh.period)
@@ -204,11 +204,11 @@ def pinned_classes(torus: Torus) -> Int:
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
-    """Find the most suitable class for the pin.
+    """Find the class with the least `unfit` (classes,) that is nearest to a cell corner.
 
     Returns:
-        A list of one triple: `unfit` (classes,) at that class, its distance from the nearest cell corner, and its key;
-        [] without classes.
+        A list of one triple: `unfit` of the class, its distance from the nearest corner, and its key; [] without
+        classes.
     """
     mesh = torus.mesh
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period

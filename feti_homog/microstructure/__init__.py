@@ -16,7 +16,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import `Arrangement` on first access, so that reading a case file does not import SciPy trees."""
+    """Import `Arrangement` on first access: case files do not need SciPy trees.  Raises AttributeError."""
     if name != "Arrangement":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from feti_homog.microstructure.arrangements import Arrangement

@@ -37,8 +37,8 @@ class Arrangement:
         outlines: N outlines without rings. Fibre k + 1 of a case has the index k; voids follow the fibres.
         phase: (N,) phases of the outlines.
         coating: (N,) thickness of the rings around the outlines, 0 without a ring.
-        is_hollow: (N,) mask of voids in hollow fibres, whose ring has the fibre phase; other rings are coatings.
-        mesh_order: (N,) meshing order, on which a few triangles depend; by index if None.
+        is_hollow: (N,) mask of voids in hollow fibres; their rings have the fibre phase, other rings are coatings.
+        mesh_order: (N,) meshing order, which changes a few triangles; by index if None.
         row: (N,) row indices in the fibre table; None for cells without a table.
         origin: lower left corner of the cell in the coordinates of the table.
         remarks: lines on the differences between the cell and the table.
@@ -65,7 +65,7 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Arrange discs with centres (N, 2), radii (N,) and coatings (N,)."""
+        """Arrange discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 
@@ -110,7 +110,7 @@ class Arrangement:
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
         """Return the region numbers (k,), from 1, of the insides or rings of fibres (k,).
 
-        Coatings follow all fibres, in the same order.
+        Coatings follow all fibres, in the order of fibres; the ring of a hollow fibre has the fibre number.
         """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
@@ -136,12 +136,12 @@ class Arrangement:
 
     @cached_property
     def outer(self) -> Outlines:
-        """The N outlines enlarged by their rings."""
+        """The N outlines enlarged by rings."""
         return self.outlines.grown(self.coating)
 
     @property
     def outer_radii(self) -> Float:
-        """The radii (N,) of equal-area discs, with rings."""
+        """The radii (N,) of equal-area discs, plus the thickness of rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
@@ -157,7 +157,7 @@ class Arrangement:
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Return the least distance between a cell side and a line tangent to an outline."""
+    """Return the least distance between a cell side and a parallel tangent to an outline."""
     tangents, size = _tangents(arrangement), arrangement.size[:, None]
     return float(np.abs(tangents - size * np.round(tangents / size)).min())
 
@@ -168,7 +168,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     The candidates along an axis are the middles of the widest gaps between tangents. Two candidates make a corner; the
     corner farthest from all outlines is selected. In symmetric cells, for example with two discs, several corners are
     equally far up to rounding errors: the first is selected, so that the length unit does not matter. Corners in voids
-    are excluded (`in_voids`).
+    (`in_voids`) are excluded if others exist.
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
@@ -192,7 +192,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     """Return the mask (n,) of corners (n, 2) within voids, for cells with polygons.
 
-    Meshes of other cells need no node at a corner.
+    All entries are False for other cells: their meshes need no node at a corner.
     """
     result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, Conics):
@@ -214,7 +214,7 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return the coordinates (k, 2, 2), by axis and side, of the tangents to k outlines normal to the axes."""
+    """Return coordinates (k, 2, 2) of tangents to k outlines, normal to the axes: by axis, low and high."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 
@@ -226,7 +226,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     i (k,), j (k,), and the vectors (k, 2) from i to the image of j.
 
     Raises:
-        MeshError: there are more pairs than MOST_PAIRS.
+        MeshError: there are more pairs than MOST_PAIRS, by an estimate.
     """
     inside = centres % size
     images = inside + STEPS[:, None] * size

@@ -55,7 +55,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        For a window the value is unbiased: on average, discs have as much area outside as others have inside.
+        For a window the value is unbiased: these discs outside and other discs inside have equal areas on average.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
@@ -66,9 +66,9 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """Return the centres (m, 2) of discs and images within `reach`, and the disc indices (m,).
+        """Return centres (m, 2) of discs and images within `reach` of the rectangle, and disc indices (m,).
 
-        The N discs in the rectangle come first.
+        The N discs in the rectangle come first; a window has no images.
         """
         number = np.arange(self.count)
         if not self.periodic:

@@ -98,7 +98,7 @@ class FibreTable:
 
     @property
     def outer_radius(self) -> Float:
-        """The radii (N,) with coating."""
+        """The radii (N,) plus the thickness of coatings."""
         return self.radius * (1 + self.coating)
 
 
@@ -183,7 +183,7 @@ class _Faults:
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Check the column names: add unknown, repeated, misspelt and missing names to the faults."""
+    """Add repeated, misspelt and missing column names to the faults; CaseError without any known name."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -206,7 +206,7 @@ def _check_names(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Check the cells of all rows and build the table; a faulty cell is a string.  Raises CaseError with all faults."""
+    """Check the cells of all rows, and build the table.  Raises CaseError with earlier and further faults."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
         for key in ("x", "y", *([] if has_size else ["radius"])):

@@ -14,7 +14,7 @@ RIM = directions(np.linspace(0.0, 2 * np.pi, 65))
 
 
 def round_fibres(image: Float) -> Float:
-    """Find the circles (k, 3), centres and radii in pixels, around round fibres in an image of several grey values.
+    """Find circles (k, 3) around round fibres in an image of several grey values: centres and radii in pixels.
 
     Edges are ridges in the slope of the filtered grey values, above the root mean square slope. Fibres are bright or
     dark, whichever puts more edges on circles. The first row of the image (rows, columns) is the lowest.
@@ -81,7 +81,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return (f - `by_chance`) sqrt(length) (k,), with the fraction f of edges on visible rims; 0 for hidden rims."""
+    """Return (f - `by_chance`) sqrt(L) (k,), with f <= 1 edges per pixel of the visible rim L; 0 for hidden rims."""
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)
@@ -89,7 +89,7 @@ def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chanc
 
 
 def _apart(circles: Float, excess: Float) -> Bool:
-    """Return the mask (k,) of circles that hardly overlap any marked circle with a larger `excess` (k,)."""
+    """Mark circles (k,) by falling `excess` (k,), unless they overlap marked circles by 0.4 of the smaller radius."""
     tree, is_apart = cKDTree(circles[:, :2]), np.zeros(len(circles), bool)
     is_covered = np.zeros(len(circles), bool)
     for k in np.argsort(-excess, kind="stable"):

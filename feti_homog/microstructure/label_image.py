@@ -1,4 +1,4 @@
-"""Read grey images, and label images, such as segmented micrographs, whose pixels hold phase numbers."""
+"""Read grey images, and label images, such as segmented micrographs, with phase numbers as pixels."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -80,7 +80,7 @@ def _check_size(path: Path, rows: int, columns: int) -> None:
 
 
 def _decoded(path: Path, is_grey: bool) -> Array:
-    """Decode an image file.  Raises CaseError."""
+    """Decode an image file, with `is_grey` to grey values, or load the array of a NumPy file.  Raises CaseError."""
     try:
         with input_files.opened(path) as stream:
             if path.suffix.lower() in (".npy", ".npz"):

@@ -33,7 +33,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     Coordinates of fibres that are not discs are always rounded.
 
     Raises:
-        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch; one line per fault.
+        MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch, one line per fault; or a cut
+            window has no room for the moves.
     """
     table, remarks = _repaired(table, window) if repairs else (table, ())
     retained, centres, moves, size = on_torus(table, window)
@@ -98,7 +99,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """Round the lengths of an arrangement to `arrangements.DECIMALS`, and its height to GMSH_DECIMALS.
+    """Round the lengths of an arrangement to DECIMALS decimals, and its height to GMSH_DECIMALS.
 
     Centres on the right or upper side move to 0.
     """
@@ -114,8 +115,8 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """Check the fibres of a table and place them on the torus.
 
-    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises like
-    `table_arrangement`.
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises MeshError as
+    `table_arrangement` does.
     """
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])
@@ -197,7 +198,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows that are the first image of a fibre, and faults of other images."""
+    """Return the mask (N,) of rows without an earlier image, all in a cut window, and the faults of images."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])

@@ -12,7 +12,7 @@ from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 
-# Number of neighbours whose distances are matched: the nearest and the second nearest.
+# Number of neighbours with matched distances: the nearest and the second nearest.
 SHELLS = 2
 # Limits of the trial moves: per fibre, and in total.
 MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
@@ -33,7 +33,7 @@ class NearestNeighbours:
 
     Attributes:
         distances: (N, k), in ascending order; infinite if a window has too few fibres.
-        directions: (N, k) degrees from x1 towards x2, in [0, 360).
+        directions: (N, k) degrees from x1 towards x2, in [0, 360); NaN at infinite distances.
         weights: (N, k), weights of the distances in their distribution; each column sums to 1.  In a periodic cell
             weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
             that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]
@@ -72,7 +72,7 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Find the nearest neighbours of all fibres; in a periodic cell images of all fibres count."""
+    """Find the `count` nearest neighbours of all fibres; in a periodic cell, images of all fibres count."""
     # Within `reach` every fibre in a periodic cell has `count` neighbours.
     reach = (count + 1) // 2 * pattern.size.min()
     if pattern.periodic and pattern.count > count:
@@ -180,8 +180,8 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
     Returns the centres and the clearance, the smallest ratio of distance to radius sum; success is a clearance of at
-    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx has no reductions over the discs, so that every machine gets
-    the same numbers.
+    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
+    reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -206,9 +206,9 @@ def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Place the fibres of a pattern at random, with gaps of at least `gap`.
+    """Place the fibres of a pattern at random, with gaps of at least `gap`; return the pattern.
 
-    Raises MeshError if the search finds no such pattern.
+    Raises MeshError for discs denser than DENSEST, or if ATTEMPTS descents of up to `max_steps` steps fail.
     """
     grown = pattern.radii + gap / 2
     attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0

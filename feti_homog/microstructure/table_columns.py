@@ -17,7 +17,7 @@ from feti_homog.microstructure.shapes.shapes import SHAPES
 from feti_homog.schema import types
 from feti_homog.system.runtime import input_files
 
-# Numeric columns, with the value of an empty cell and the bounds.
+# Numeric columns, each with the value of an empty cell and bounds.
 NUMBERS = {
     "x": ColumnRange(math.nan),
     "y": ColumnRange(math.nan),
@@ -29,7 +29,7 @@ NUMBERS = {
 FIBRE_CELLS: Mapping[str, types.ValueType] = {
     name: types.real(least=column.least, above=column.above) for name, column in NUMBERS.items()
 }
-"""The numbers of a fibre in a table."""
+"""The types of the numbers of a fibre, by column."""
 
 MAX_BYTES = 1 << 26
 EMPTY = " \t\r,;"
@@ -37,13 +37,13 @@ EMPTY = " \t\r,;"
 SEPARATOR = re.compile(r"sep=[,;\t]?")
 """A first line that tells Excel the separator."""
 UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
-"""The signs of micro, degree and square in Excel's Western European code pages."""
+"""Letters for the signs of micro, degree and square in Excel's Western European code pages."""
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     """Yield number, content and comment of each line in a text file.
 
-    Numbers begin at 1; the content is "" for a line without cells; the comment is the text behind "#".
+    Numbers begin at 1; the content is "" for lines without cells, and "sep=;"; the comment is the text behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is not text.
@@ -78,7 +78,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row with an open quotation mark or without `count` cells, or an empty string."""
+    """Return the fault of a row: an open quotation mark, or no `count` cells; else an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"
@@ -90,7 +90,7 @@ ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
 AXES_OF_PICTURES = {"major", MATLABS_AXIS}
-"""Names of major axes in tables whose y points down, but whose angles are counter-clockwise in the picture."""
+"""Names of major axes in tables where y points down, but angles are counter-clockwise in the picture."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
@@ -137,12 +137,12 @@ def _bare(word: str) -> str:
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Recognize `known` columns in a line of names, in upper or lower case; return unknown words as well."""
+    """Recognize `known` columns in a line of names, in upper or lower case; also return the other names."""
     bare = list(map(_bare, words))
     if MATLABS_AXIS in bare:
         # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
-    # Where y points down, angles are still measured as the picture is seen.
+    # Where y points down, angles are still counter-clockwise in the picture.
     values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
     columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
@@ -159,7 +159,7 @@ def are_units(words: Sequence[str]) -> bool:
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the missing column whose name resembles a word, or an empty string."""
+    """Return the missing column with a name similar to a word, or an empty string."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 

@@ -1,4 +1,4 @@
-"""Tables of keys: value types, a reader that collects all faults of a table, and the wording of faults.
+"""Define value types, a reader that collects all faults of a table, and the wording of faults.
 
 Imports nothing.  Main entries: `types` (types with a description and a test, limits); `keys.key`, `keys.TableReader`.
 """

@@ -1,4 +1,4 @@
-"""Read case file tables into frozen dataclasses, whose fields have the rules of their keys."""
+"""Read the tables of a case file into dataclasses; each field holds the rules of its key."""
 
 from __future__ import annotations
 
@@ -18,10 +18,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """A key whose value decides which other keys belong to the case.
-
-    `word` is the name of the key in messages, if it is not `key`.
-    """
+    """A key of `section` that decides which other keys belong to the case; `word` may rename it in messages."""
 
     section: str
     key: str
@@ -40,11 +37,11 @@ class Condition:
     values: tuple[str, ...]
 
     def holds(self, selected: Selected) -> bool:
-        """Return whether the condition holds; False if the value of the selector is faulty."""
+        """Return whether the selector has one of the values; False if its value is faulty or missing."""
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition as in a message about `section`: key = value or value."""
+        """Write the condition in a message about `section`: key = A or B, or [other] key = A or B."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
@@ -62,7 +59,7 @@ class Key:
         type: type of the value.
         meaning: one or two sentences for the reference.
         unit: unit symbol, empty without a unit.
-        default: default value in words, empty without a default.
+        default: default value, or meaning of a missing key, in words; may be empty.
         only: conditions; the key belongs to a table if all conditions hold.
         required: whether a table must have the key if all conditions hold.
         instead: hint to another key for tables where a condition fails, or empty.
@@ -85,7 +82,7 @@ class Key:
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
         """Return the fault of the key `name` in a table; empty without a fault.
 
-        The conditions in `only` are not checked.
+        The text follows the name in a message. `only` is not checked; keys with conditions may be missing.
         """
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
@@ -103,10 +100,11 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     **attributes: Any,
 ) -> Any:
-    """Return a dataclass field for the key with the name of the field.
+    """Return a dataclass field that holds the rules of the key with the field name.
 
-    Without `default` and `absent`, the key is required.  `absent` says what a missing key means: the value is then
-    None. `default_words` describe the default.  `attributes` are further attributes of `Key`.
+    Without `default` and `absent`, the key is required.  A required key with conditions, or a missing key with the
+    meaning `absent`, has the value None.  `default_words` replace the default in the reference.  `attributes` are
+    further attributes of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
@@ -118,7 +116,7 @@ def key(
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """Return the keys of a table class by name, without derived fields."""
+    """Return the keys of a table class by name; fields that are no keys are left out."""
     return {entry.name: entry.metadata["key"] for entry in dataclasses.fields(table_class) if "key" in entry.metadata}
 
 
@@ -139,7 +137,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Every fault adds a line to `faults`, where keys are written as [`section`] `prefix` key.
+        Every fault, also in a nested table, adds a line to `faults`; `prefix` precedes the key name in this line.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
@@ -155,7 +153,7 @@ class TableReader:
         return table_class(**values) if len(self.faults) == before else None
 
     def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
-        """Convert a valid value, and tables within it, to the stored form."""
+        """Convert a valid value to the stored form, and read the tables in it; None for a faulty table."""
         if type_.item is not None:
             return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
         if type_.table is not None and isinstance(value, dict):
@@ -166,7 +164,7 @@ class TableReader:
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
     """Convert an instance to a table of TOML values, as the inverse of `TableReader.read`.
 
-    The table lacks keys without a value, and keys whose conditions do not hold.
+    Keys with the value None, and keys with a condition that `selected` violates, are left out; inf becomes INF.
     """
 
     def to_toml(value: Any) -> Any:

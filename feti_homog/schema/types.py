@@ -16,15 +16,15 @@ from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Limits for magnitudes of numbers other than 0, so that products of a few numbers neither overflow nor underflow."""
-MOST_BYTES = 1 << 22  # of a case file: tomllib reads 1 to 3 MB a second
-MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # of a table, of a list
-MOST_FIBRES = 100_000  # in a cell, with as many voids: twice as many rows of a table
+MOST_BYTES = 1 << 22  # in a case file: tomllib reads 1 to 3 MB a second
+MOST_KEYS, MOST_ENTRIES = 10_000, 100_000  # in a table, in a list
+MOST_FIBRES = 100_000  # in a cell; a table has up to twice this number of rows, fibres and voids
 MOST_ROWS = 10_000  # arcs, waypoints, points of a curve, cases of a sweep: 50 to 500 us each
 MOST_SECTIONS = 1000  # [[interface]], for pairs among 45 phases; [[test]]; uncertain numbers
-MOST_PIXELS = 100 * MOST_FIBRES  # of an image: two triangles each
+MOST_PIXELS = 100 * MOST_FIBRES  # in an image: two triangles each
 Test = Callable[[Any], bool]
 INF = "inf"
-"""The text for an infinite number in resolved cases, because JSON has no such number."""
+"""The text for an infinite number in resolved cases, because JSON has no infinity."""
 MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
 
 
@@ -33,12 +33,12 @@ class ValueType:
     """The type of a value.
 
     Attributes:
-        expected: description for messages and the reference.
+        expected: description in messages and in the reference.
         accepts: test whether a TOML value is valid.
         store: conversion of a valid value to the form in the dataclass.
         table: dataclass of a table, which `TableReader` reads; None for other values.
         item: type of the entries of a list with tables; None for other values.
-        options: valid strings of a choice.
+        options: valid strings of a choice; else empty.
     """
 
     expected: str
@@ -54,7 +54,7 @@ class ValueType:
 
 
 def _scatter(value: Any) -> str:
-    """Return a hint to `feti-homog uncertainty` for a value {mean, std} or {mean, cv}; else empty."""
+    """Return a hint to `feti-homog uncertainty` for {mean, std} or {mean, cv}, also in a list; else empty."""
     if isinstance(value, list):
         return next(filter(None, map(_scatter, value)), "")
     has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
@@ -62,7 +62,7 @@ def _scatter(value: Any) -> str:
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """Return the magnitude limits in words if a number in `value` exceeds a limit; else empty."""
+    """Return the magnitude limits in words if a number in `value` violates them; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -86,7 +86,7 @@ def integer(**limits: float) -> ValueType:
 
 
 def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Mapping[str, float]) -> ValueType:
-    """Return the type of numbers that pass `is_of_type` and the limits, described as `name`."""
+    """Return the type of numbers that pass `is_of_type` and `limits` (see `real`); messages call them `name`."""
     kinds = {"above": operator.gt, "at least": operator.ge, "below": operator.lt, "at most": operator.le}
     bounds = [(words, limits.get(words.split()[-1], math.inf)) for words in kinds]
     finite = [(words, limit) for words, limit in bounds if math.isfinite(limit)]
@@ -101,9 +101,9 @@ def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Ma
 def list_of(
     item: ValueType, expected: str, *, least: int = 0, most: int = 0, count: int | None = None, unique: bool = False
 ) -> ValueType:
-    """Return the type of lists whose entries have the type `item`.
+    """Return the type of lists whose entries have the type `item`, stored as tuples.
 
-    A list has at least `least` and at most `most` entries (0: any number), or exactly `count`; `unique` entries differ.
+    A list has at least `least` and, unless 0, at most `most` entries, or exactly `count`; with `unique`, all differ.
     """
     fewest, largest = (least, most or math.inf) if count is None else (count, count)
     expected += f", at most {most} of them" if most else ""
@@ -116,7 +116,7 @@ def list_of(
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
-    """Return the type of values that one of several types accepts."""
+    """Return the type of values that one of several types accepts; the first such type converts a value."""
     table = next((kind.table for kind in types if kind.table is not None), None)
     return ValueType(
         expected,
@@ -127,7 +127,7 @@ def either(expected: str, *types: ValueType) -> ValueType:
 
 
 def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
-    """Return the type of tables with at least `least` keys, which `TableReader` reads."""
+    """Return the type of tables with `least` keys or more; `TableReader` reads them into the class `table`."""
     return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, table)
 
 
@@ -145,6 +145,6 @@ def choice(*options: str) -> ValueType:
 POSITIVE_OR_INF = ValueType(
     "a positive number, or inf", lambda value: value in (math.inf, INF) or (is_number(value) and value > 0), float
 )
-"""The type of keys in which inf differs from a missing value."""
+"""The type of positive numbers and inf, for keys where inf differs from a missing value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
 text = ValueType("a string in one line", lambda value: isinstance(value, str) and value.isprintable(), str)

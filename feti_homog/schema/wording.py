@@ -21,7 +21,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
-# Names of quantities and old keys for which this program has no key, with a hint.
+# Quantities and former keys without a key in this program, each with a hint.
 ABSENT = {
     "g": "it follows from young and poisson",
     **{f"e{ij}": f"expected a shear strain as gamma{ij} = 2 E{ij}" for ij in (12, 13, 23)},
@@ -51,7 +51,7 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """Return a key as in TOML, in quotes unless bare; a key of more than LONGEST_VALUE characters is cut off."""
+    """Return a key as in TOML, in quotes unless bare, cut off after LONGEST_VALUE characters."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 
@@ -62,9 +62,9 @@ def dotted_key(path: Iterable[str]) -> str:
 
 
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
-    """Return a hint for an unknown name: its section, the nearest `known` name, or all known names.
+    """Return a hint for an unknown name: a synonym, a reason for its absence, its section, or valid names.
 
-    `owners` maps every key of the file to its sections, in words.
+    `known` are the valid names, and `owners` maps every key of the file to its sections, in words.
     """
     known = list(known)
     if keys := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
@@ -79,6 +79,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with the fewest digits, at least `digits`, such that `value` >= the written limit."""
+    """Write a limit with the fewest digits, `digits` or more, that do not make it exceed `value`."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

@@ -1,6 +1,6 @@
 """Mesh a label image within smooth outlines: contours by marching squares, filled by gmsh.
 
-The cell sides run through pixel centres. Contours cross opposite sides at the same positions, so that sides match.
+The cell sides run through pixel centres. Contours cross opposite sides at equal positions, so that sides match.
 """
 
 from dataclasses import replace
@@ -25,9 +25,9 @@ from feti_homog.typing import Bool, Float, Int32
 
 
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
-    """Mesh the regions of an image with phases (rows, columns) within smooth outlines.
+    """Mesh the regions of an image with phase numbers (rows, columns) within smooth outlines.
 
-    A Gaussian filter, one pixel wide, smooths an indicator; splines follow the contour that preserves the area.
+    A Gaussian filter, one pixel wide, smooths the mask `_every_other`; splines follow the contour of equal area.
 
     Raises:
         CaseError: scikit-image is not installed.
@@ -79,7 +79,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Mark the pixels (rows, columns) that an odd number of outlines separates from the matrix.  Raises MeshError."""
+    """Mark pixels (rows, columns) an odd number of outlines off the matrix; MeshError if three phases touch."""
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
     a, b = a[a != b], b[a != b]
@@ -92,10 +92,10 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
-    """Return the field of edge sizes for `curves`, points (k, 2) in pixels.
+    """Return the field of edge sizes, in cell widths, for `curves` of points (k, 2), in pixels.
 
-    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, half as many. In narrow passages,
-    between points with opposite gradients, edges are shorter.
+    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number. Edges
+    are shorter in narrow passages, between points with opposite gradients of the `indicator`.
     """
     unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
     points = np.concatenate([np.zeros((1, 2)), *curves])
@@ -114,7 +114,7 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 
 
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
-    """Assign the prevailing phase of its elements to each surface, and remove the elements of voids.
+    """Assign to each surface the prevailing phase of its elements, and remove the elements of voids.
 
     Edges that rise by more than 0.2 of their length, and so turn by more than 87 degrees, become straight.
     """

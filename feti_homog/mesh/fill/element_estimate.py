@@ -21,9 +21,9 @@ MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0
 # Additional triangles around a fibre of a random cell, because of narrow gaps.
 TRIANGLES_OF_A_FIBRE = 160
-# Ratios of element sizes, up to more than a case allows.
+# Ratios of element sizes; the largest exceeds every ratio in a case.
 RATIOS = np.geomspace(1.0, 1e7, 400)
-# Number of positions along each axis at which the size is sampled.
+# Number of samples of the size along each axis.
 POSITIONS = 200
 
 
@@ -34,9 +34,9 @@ class ElementEstimate:
     Attributes:
         cell: the cell section, with element sizes.
         fibres: fibre count.
-        mean_radius: mean radius of the fibres; of fibres and voids in a table.
+        mean_radius: radius of a fibre of mean area; in a table, the mean radius of fibres and voids.
         height: cell height / cell width.
-        interfaces: total length of the interfaces.
+        interfaces: total length of the interfaces, without coatings.
         ovals: the elliptic fibres in a table.
     """
 
@@ -63,7 +63,7 @@ class ElementEstimate:
 
     @property
     def interface_size(self) -> float:
-        """The element size on interfaces."""
+        """The element size on interfaces, for at least MIN_EDGES_AROUND edges around the mean fibre."""
         asked = self.cell.interface_size or self.cell.mesh_size
         return min(asked, 2 * math.pi * self.mean_radius / MIN_EDGES_AROUND)
 
@@ -71,8 +71,8 @@ class ElementEstimate:
     def triangles(self) -> float:
         """The estimated triangle count in a cell without debonded arcs.
 
-        Triangles of one size fill the cell. More triangles lie around fibres, at the ends of ellipses, and on both
-        sides of interfaces of length P and size h, growth g: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).
+        Triangles of one size fill the cell. More lie around fibres, at the ends of ellipses, and on both sides of
+        interfaces of length P, size h, growth g and A = TRIANGLE_AREA: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).
         """
         cell = self.cell
         irregular = 0 if cell.geometry in cell_section.LATTICES else self.fibres
@@ -87,10 +87,10 @@ class ElementEstimate:
 
 
 def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Float, limit: int = MAX_TRIANGLES) -> None:
-    """Refuse a cell of periods (2,) that needs too many elements.
+    """Refuse a cell with the `period` (2,) that needs too many elements.
 
-    The number is the integral of 1 / (TRIANGLE_AREA h^2) over the cell. Unlike `ElementEstimate`, h(x) takes account of
-    narrow gaps and thin coatings. No sum is necessary if the lower bound `smallest` of h already guarantees `limit`.
+    The number is the integral of 1 / (TRIANGLE_AREA h^2) over the cell, where h = `size_at`(x) takes account of narrow
+    gaps and thin coatings. No sum is necessary if the lower bound `smallest` of h already guarantees `limit`.
 
     Raises:
         MeshError: the cell needs more than `limit` elements.
@@ -108,14 +108,14 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
     """Return the number of additional triangles around a tip.
 
-    With the size h at the tip and `ratio` h around, the number is int 2 pi r dr / (A (h + g r)^2) up to the radius r
-    where h + g r = ratio h, less the triangles that elements of size `ratio` h would need there.
+    With the size h at the tip, the growth g and A = TRIANGLE_AREA, the number is int 2 pi r dr / (A (h + g r)^2) up to
+    the radius r where h + g r = ratio h, less the number of triangles of size ratio h in this circle.
     """
     within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
     return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Return the size ratio at a tip with `count` additional triangles."""
+    """Return the size ratio at a tip with `count` additional triangles, at most RATIOS[-1]."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

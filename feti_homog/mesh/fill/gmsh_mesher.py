@@ -28,10 +28,9 @@ def begin(
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh of a generated cell.
 
-    Round and elliptic fibres give an `UnmeshedCell`, whose lines lack nodes; a table with polygons gives the mesh.
-
-    The element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before
-    the final scaling, so that cells of one shape have the same mesh at all sizes.
+    Round and elliptic fibres give an `UnmeshedCell` with lines without nodes; a table with polygons gives the mesh. The
+    element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before the
+    final scaling, so that cells of one shape have the same mesh at all sizes.
 
     Args:
         listed: the arrangement of a table; None for other cells, which may be large.
@@ -73,7 +72,7 @@ def begin(
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
-    """Return the ratio of lengths in the cell to lengths in the arrangement."""
+    """Return the scale, lengths in the cell / lengths in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width

@@ -13,10 +13,11 @@ from feti_homog.typing import Bool
 
 
 def read_cell(cell: cell_section.Cell) -> CoarseMesh:
-    """Read the mesh file or the image of a cell.
+    """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
     Raises:
-        CaseError, MeshError: as for `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`.
+        CaseError, MeshError: as in `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`;
+            also for pixels that voids cut off, and for voids at sides with tractions.
     """
     assert cell.file is not None
     if cell.geometry == "mesh":

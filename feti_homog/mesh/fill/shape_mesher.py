@@ -56,7 +56,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
-    """Fill the surfaces of a cell with periodic second-order triangles, with edge sizes from `field`."""
+    """Fill the surfaces of a cell with periodic second-order triangles, sized by `field`; raises gmsh's Exception."""
     # Curves on the right and upper sides copy the nodes of the left and lower sides.
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -144,10 +144,11 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 
 
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
-    """Return the size field h = min_k h_k + g |x - x_k| over points x_k on all outlines.
+    """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
-    h_k is at most the interface size, a fraction of the circle with the local curvature, and PASSAGE_EDGE times the
-    distance to the next outline or to a cell side opposite the outline.
+    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle that rounds corners or fits in an ellipse,
+    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
+    side that the outline faces; it is at least LEAST cell sizes.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

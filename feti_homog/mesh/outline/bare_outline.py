@@ -46,7 +46,7 @@ class BareOutline:
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
-        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves.
+        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves; else `bridges` is None.
         """
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
@@ -90,11 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, with matching nodes on opposite sides.
-
-        Raises:
-            MeshError: the sides would have more nodes than the sampling allows.
-        """
+        """Make the outline from nodes on arcs and bridges, and matching nodes on sides.  Raises MeshError."""
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
         parts = [*self._sides(0), *self._sides(1)]
@@ -115,7 +111,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield the nodes (n, 2) and the curves of the two sides along `axis`, whose nodes match."""
+        """Yield nodes (n, 2) and curves of both sides along `axis`, with matching nodes.  Raises MeshError."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)

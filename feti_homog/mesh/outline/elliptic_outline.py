@@ -33,7 +33,7 @@ class EllipticArcs(Lines):
 
     @classmethod
     def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
-        """Return arcs between parameters (a,) of ellipses (a,), with edges of at most `cap`."""
+        """Return the arcs of `ellipses` (a,) from `start` (a,) to `stop` (a,), with edges of at most `cap`."""
         share = np.linspace(0, 1, convex_sums.POINTS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
@@ -65,8 +65,8 @@ def size_field(
 ) -> graded_size.SizeField:
     """Return the size field of a cell with ellipses; see `graded_size.size_field`.
 
-    Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2), where the edge length is in proportion to R phi,
-    with the angle phi between side and ellipse, and the radius of curvature R.
+    Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2), where edges are at most R phi / WEDGE long, with
+    the angle phi between side and ellipse, and the radius of curvature R.
     """
     size, largest, inner = arrangement.size, sizes.largest, arrangement.outlines
     assert isinstance(inner, Ellipses)

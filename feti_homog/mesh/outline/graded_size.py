@@ -40,10 +40,10 @@ def wrap(points: Float, size: Float) -> Float:
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Return the longest edge (k,) on each circle, for at least MIN_EDGES_AROUND edges.
+    """Return the longest edge (k,), up to `largest`, on each circle of `arrangement.shells`.
 
-    Edges on a coating of thickness t and inner radius a have a length of at most sqrt(t a). The distance to the arcs
-    is then at most t / 8, and elements across the coating do not turn over when edges bend.
+    A circle has at least MIN_EDGES_AROUND edges. Edges on a coating of thickness t and inner radius a are at most
+    sqrt(t a) long: their arcs rise at most t / 8, and elements across the coating do not turn over when edges bend.
     """
     shells, disc = arrangement.shells
     caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
@@ -109,7 +109,7 @@ class MeshSizes:
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
-        """Return the sizes (N,) on the circles of each disc."""
+        """Return the edge sizes (N,) on the circles of N discs; a disc and its coating have one size."""
         sizes = np.minimum(self.interface, coating_size(arrangement))
         around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
         return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
@@ -163,11 +163,10 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     """Return the edge size on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
-    of the cell, with h_k proportional to the passage width. The mandatory `vertices` (v, 2) are also sources, with the
-    distance to the next vertex as h_k.
-
-    The size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one
-    of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
+    of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
+    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. The size
+    is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one of the
+    `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)

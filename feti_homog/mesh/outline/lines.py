@@ -154,7 +154,7 @@ class Sampling:
     most_nodes: int
 
 
-# For cells that one rank meshes in minutes, and for cells that all ranks mesh, whose arcs are a few edges long.
+# For cells that one rank meshes in minutes, and for cells that all ranks mesh: these have arcs of a few edges.
 WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
 
 
@@ -164,8 +164,8 @@ class Stations:
 
     Attributes:
         share: (n,) fraction of the line length before each node, from 0 to 1.
-        first: (c + 1,) line k has the nodes from first[k] up to first[k + 1].
-        edges: int ds / h over all lines.
+        first: (c + 1,) line k has the nodes first[k] : first[k + 1].
+        edges: int ds / h over all lines, with the edge size h.
     """
 
     share: Float
@@ -179,11 +179,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
-        """Concatenate the nodes of all parts, in the order of the parts.
-
-        Raises:
-            MeshError: all parts together have more than `limit` edges.
-        """
+        """Concatenate the nodes of all parts, in this order.  Raises MeshError for more than `limit` edges in all."""
         edges = sum(part.edges for part in parts)
         _refuse_many(edges, limit)
         counts = np.concatenate([np.diff(part.first) for part in parts])
@@ -199,8 +195,8 @@ def _refuse_many(edges: float, limit: int) -> None:
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
     """Place nodes on lines at equal steps of the integral of ds / h, with the edge size h.
 
-    `least_edges`, () or (c,), is the least number of edges of a line. A line has at least `least_samples` equidistant
-    samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
+    h is the size in `field`, limited by `lines.cap`. A line has at least `least_edges`, () or (c,), edges. It has
+    `least_samples` equidistant samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
 
     Raises:
         MeshError: the lines would have more than `limit` nodes.
@@ -263,22 +259,18 @@ class SizedLines:
     sampling: Sampling
 
     def parts(self, count: int) -> list[SizedLines]:
-        """Divide the lines, in order, into `count` parts of equal size."""
+        """Divide the lines, in order, into `count` parts of nearly equal size."""
         bounds = (distributed_arrays.even(len(lines), count) for lines in (self.arcs, self.bridges))
         ends = zip(*map(pairwise, bounds), strict=True)
         return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:
-        """Place the nodes on the arcs and bridges.
-
-        Raises:
-            MeshError: the lines would have more nodes than the sampling allows.
-        """
+        """Place the nodes on the arcs and bridges.  Raises MeshError if the sampling allows fewer nodes."""
         sampling = self.sampling
         arcs = place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes)
         return arcs, place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes)
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
-        """Concatenate the nodes of all parts of these lines.  Raises MeshError if the sampling allows fewer nodes."""
+        """Concatenate the nodes of all `parts` of the lines.  Raises MeshError if the sampling allows fewer nodes."""
         arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges

@@ -25,7 +25,7 @@ Marks = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Bridges:
-    """Straight lines from the first to the second disc in `ends` (b, 2), with directions `angle` (b,)."""
+    """Straight lines between discs `ends` (b, 2), in the directions `angle` (b,), in radians, from the first."""
 
     ends: Int
     angle: Float
@@ -61,7 +61,7 @@ class Outline:
 
 
 def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
-    """Find the outlines (k,) in the cell, with the fibres (k,) and the surrounding outlines (k,).
+    """Find the outlines (k,) in the cell, their fibres (k,), and the outlines around them (k,), or MATRIX.
 
     Periodic images have separate entries, fibre by fibre and image by image, coating before core.
     """
@@ -84,21 +84,21 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the sorted coordinates of corners and crossings on the side through 0 parallel to `axis`."""
+    """Return the coordinates of corners and curves on the side through 0 along `axis`, in ascending order."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
 def on_side(places: Float, axis: int, level: float) -> Float:
-    """Return the points (k, 2) with coordinates `places` on a side at `level` along `axis`."""
+    """Return the points (k, 2) at coordinates `places` (k,) along `axis`, on the side at `level`."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points
 
 
 def curve_at(curves: Conics, points: Float) -> Int:
-    """Find the smallest closed curve (k,) around each point on a line, or MATRIX."""
+    """Find the smallest curve (k,) around each point (k, 2), or MATRIX."""
     beyond = curves.centres - np.clip(curves.centres, points.min(axis=0), points.max(axis=0))
     numbers = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
     if not len(numbers):
@@ -122,7 +122,7 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
 def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
     """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
-    `name` (k,) has the key of each curve in `marks`.
+    `name` (k,) has the key of each curve in `marks`. Marks within MERGED of another vertex are left out.
     """
     number, points = crossing
     offset, count = points - curves.centres[number], len(number)
@@ -136,9 +136,9 @@ def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks:
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves into arcs of at most a quarter turn; keep the arcs in the cell.
+    """Divide curves at `vertices` into arcs in the cell, of at most a quarter turn.
 
-    Returns the curve, start and stop (a,) of each arc. The arcs of a curve without vertices begin at the angle 0.
+    Returns curves (a,), and first and last parameters (a,). The arcs of a curve without vertices begin at 0.
     """
     bare_curves = np.setdiff1d(np.arange(len(curves)), vertices[0])
     curve, angle = np.append(vertices[0], bare_curves), np.append(vertices[1], np.zeros(len(bare_curves)))
@@ -158,7 +158,7 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
 
 
 def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Float:
-    """Find the vertices (t, 2) at all marks on existing curves."""
+    """Find the vertices (t, 2) at the marks on the curves of an arrangement."""
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
     name, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])

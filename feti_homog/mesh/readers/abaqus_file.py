@@ -33,8 +33,9 @@ BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 def load(path: Path) -> RawMesh:
     """Read triangles, quadrilaterals and lines from an input file with one part.
 
-    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names, else the *ELSET, else the
-    ELSET of *ELEMENT; names become lower case unless quoted. Elements have first or second order.
+    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names (its material, if a material
+    and no set is named matrix), else the *ELSET, else the ELSET of *ELEMENT; names become lower case unless quoted.
+    Elements have first or second order.
 
     Raises:
         OSError: the file cannot be read.
@@ -74,7 +75,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read one block; ValueError if the block is refused or faulty."""
+        """Read a block of nodes, elements, sets or sections, skip others; ValueError if it is refused or faulty."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:
@@ -103,7 +104,7 @@ class _Content:
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Read elements, and check the node counts against the element type."""
+        """Read the elements of a block; ValueError for unusable types, wrong node counts and repeated numbers."""
         if self.is_assembly:
             raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()
@@ -125,7 +126,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Read the members of a set: numbers, set names or, with GENERATE, ranges with a step (default 1)."""
+        """Add the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -143,14 +144,14 @@ class _Content:
                 members.update(part)
 
     def members(self, name: str) -> set[int]:
-        """Return the elements of a set, from sections, *ELSET and *ELEMENT."""
+        """Return the elements of a set, from sections, *ELSET and *ELEMENT; ValueError for an unknown set."""
         levels = [self.sets[level, name] for level in (BY_SECTION, BY_SET, BY_ELEMENTS) if (level, name) in self.sets]
         if not levels:
             raise ValueError(f'there is no element set "{name}"')
         return set().union(*levels)
 
     def raw_mesh(self) -> RawMesh:
-        """Group the triangles by set names, and add the sets of lines.
+        """Return the mesh, with triangles grouped by set names, and with sets of lines as curves.
 
         Raises:
             MeshError: triangles, nodes of elements, or sets of sections are missing.

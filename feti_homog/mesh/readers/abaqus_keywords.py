@@ -107,7 +107,7 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
     """Yield the keyword blocks of a file.
 
     Raises:
-        MeshError: a keyword is unknown, or data precede the first keyword.
+        MeshError: a keyword is unknown, its parameter is not read, or data precede the first keyword.
     """
     block, open_line = None, ""
     for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
@@ -150,6 +150,6 @@ def resolved(word: str) -> str:
 
 
 def name_of(word: str) -> str:
-    """Convert a name to lower case unless it is quoted."""
+    """Convert a name to lower case, or strip its quotation marks."""
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()

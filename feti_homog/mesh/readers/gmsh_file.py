@@ -128,7 +128,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into sections by name, without the first and last lines of sections."""
+    """Split a file into its sections, without first and last lines, by name; OTHERS are skipped.  Raises MeshError."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -160,7 +160,7 @@ def _read_by_gmsh(path: Path) -> MshContent:
     # Wrong extreme numbers in the head of a section do no harm; "Error loading" repeats the previous message.
     passed = ("Info", "Progress", "Warning: Min/Max", "Error: Error loading")
     with gmsh_session() as gmsh:
-        gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # which adds elements between partitions
+        gmsh.option.setNumber("Mesh.PartitionCreateTopology", 0)  # 1 would add elements between partitions
         for only_groups in (False, True):
             gmsh.clear()
             gmsh.option.setNumber("Mesh.SwitchElementTags", only_groups)
@@ -186,7 +186,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: nodes or elements share a number, a node is missing, or an element type is not in LINES or TRIANGLES.
+        MeshError: numbers repeat; nodes, triangles or lines of DEBONDED are missing; other element types occur.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])

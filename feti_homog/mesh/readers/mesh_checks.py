@@ -12,9 +12,9 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.schema import types
 from feti_homog.typing import Float, Int, Int32
 
-# Number of coincident pairs below which all are listed: the number grows with the square of the nodes.
+# All coincident pairs are listed up to this number, because it grows with the square of the nodes.
 MOST_PAIRS = 1000
-# Limit for pairs of an edge and a nearby node, whose number may also grow with the square.
+# Limit for pairs of an edge and a nearby node: their number may also grow with the square of the nodes.
 MOST_CANDIDATES = 10**7
 # Distance / edge length below which a node hangs on an edge; a flatter element would be of no use.
 HANGING_DISTANCE = 1e-2
@@ -56,7 +56,7 @@ def not_finite(mesh: RawMesh) -> list[str]:
 
 
 def not_planar(mesh: RawMesh) -> list[str]:
-    """Name the first node outside the plane of node 0."""
+    """List the first node outside the plane of node 0."""
     height = mesh.points[:, 2]
     bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
     places = (f"{mesh.node(int(k))} has z = {height[k]:.9g}" for k in (*bad[:1], 0))
@@ -77,7 +77,7 @@ def duplicate_nodes(mesh: RawMesh) -> list[str]:
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T
-    square = column * (row.max() + 1) + row  # whose diagonal is shorter than the reach
+    square = column * (row.max() + 1) + row  # a diagonal is shorter than the reach
     order = np.argsort(square, kind="stable")
     same = square[order[1:]] == square[order[:-1]]
     pairs = np.sort(np.column_stack([order[:-1][same], order[1:][same]]), axis=1)
@@ -138,7 +138,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie on inner edges with a single triangle.
 
-    `plane` (n, 2) are node positions relative to the lower left corner; nodes on sides have exact coordinates.
+    `plane` (n, 2) are positions from the lower left corner, exact on sides; too many candidates give only a count.
     """
     single = mesh.border
     inner = single[~on_sides(plane[single], size)]
@@ -168,7 +168,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:
-    """List debonded lines whose ends are not nodes of triangles."""
+    """List debonded lines with an end that is no node of a triangle."""
     bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
     fault = f'lines in the {mesh.curve_container} "{DEBONDED}" that are no edges of triangles: '
     return _listed(fault, bad, lambda ends: f"that between nodes {ends[0]} and {ends[1]}")
@@ -185,14 +185,14 @@ def cannot_debond(mesh: RawMesh, torus: Torus) -> list[str]:
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
-    """List all curves except DEBONDED in one line."""
+    """List all curves except DEBONDED in one line; () without such curves."""
     names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
     advice = f'not used; lines that are debonded from the start belong in "{DEBONDED}"'
     return tuple(_listed(f"{mesh.curve_container} ", names, str, f": {advice}"))
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List side nodes without a partner on the opposite side, and sides without inner nodes."""
+    """List nodes without a partner, except on the side with fewer nodes, and sides without inner nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))

@@ -46,11 +46,12 @@ def read(
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
     The file, with a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
-    "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`, and opposite
-    sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are debonded
-    from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses (`with_ellipses`);
-    other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and numbers in the file
-    (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides (`snapped`).
+    "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`. In a periodic cell,
+    opposite sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are
+    debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
+    (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
+    numbers in the file (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides
+    (`snapped`).
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
@@ -70,7 +71,7 @@ def read(
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
-    """Check a raw mesh and convert it; faults begin with `path`. Raises MeshError, as `read` does."""
+    """Check a raw mesh and convert it; faults begin with `path`. Raises MeshError, see `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     # All triangles become counter-clockwise; middle nodes belong to edges of either direction.
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
@@ -130,7 +131,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
     on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
     to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
-    beyond the tolerance stay, and the checks report such nodes.
+    beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
@@ -161,7 +162,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Report a cell that is a parallelogram or a hexagon."""
+    """List the fault of a cell that is a parallelogram or a hexagon; [] for other cells."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -180,7 +181,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phase that selects the group by name or alias.
+    """Rename each group to the phases that select its name or, if none does, an alias.
 
     Other groups keep their names. The entry `debonded` selects curves.
 
@@ -215,7 +216,7 @@ def _key(name: str | int) -> str:
 
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
-    """List physical surfaces with a name that is not a phase, and a missing matrix."""
+    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases."""
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'

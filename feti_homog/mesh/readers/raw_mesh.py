@@ -31,7 +31,7 @@ class MiddleNodes:
     points: Float
 
     def between(self, pairs: Int32) -> Float:
-        """Return the middle node position (p, 2) of each corner pair (p, 2), else NaN."""
+        """Return the middle node position (p, 2) of each corner pair (p, 2); NaN without a middle node."""
         nodes, middle = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1, np.full((len(pairs), 2), np.nan)
         keys = edge_keys(self.edges, nodes), edge_keys(pairs, nodes)
         _, number, place = np.intersect1d(*keys, return_indices=True)
@@ -81,7 +81,7 @@ class RawMesh:
         return np.asarray(pairs[first[count == 1]])
 
     def node(self, number: int) -> str:
-        """Describe a node in words."""
+        """Describe a node in words: number and position."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
@@ -90,7 +90,7 @@ class RawMesh:
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """Describe an edge in words."""
+        """Describe an edge in words, by both nodes."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
@@ -100,7 +100,7 @@ def at(point: Float) -> str:
 
 
 def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """List the first few names and count the remaining names."""
+    """List the first `shown` of `total` names, and count the other names."""
     listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
     return listed if total <= shown else f"{listed} and {total - shown} more"
 
@@ -178,8 +178,9 @@ def in_triangles(corners: Int, points: Float) -> Int:
     """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
     Diagonals join nodes at an even number of sides from the first node of connected quadrilaterals, so that diagonals
-    alternate in a grid: parallel diagonals couple stretch and shear.  The cut depends on positions, not on numbers.
-    Where no such diagonal exists, or it cuts off a much smaller triangle than the other, the better diagonal is used.
+    alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal cuts if its smaller triangle
+    is MUCH_LARGER times larger or, where even and odd nodes do not alternate, just larger.  The cut depends on
+    positions, not on numbers.
     """
     x, y = points[corners].T[:2]  # (4, m)
 

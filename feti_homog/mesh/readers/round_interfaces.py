@@ -33,7 +33,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. Other interfaces stay polygons.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it
+    cannot, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
@@ -75,7 +76,7 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
-    interfaces do not change. In triangles with two edges on one ellipse, an edge flips.
+    interfaces do not change. In triangles with two edges on one ellipse, the third edge flips.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -98,8 +99,9 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
 def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Bend each interface edge to the circle through both ends and the middle node.
 
-    Edges on circles and ellipses do not change, nor do edges whose middle node is within STRAIGHT edge lengths of the
-    chord. In a triangle with two edges on one curve, one flips: the curve has no corner there.
+    Edges on circles and ellipses do not change, nor do edges without a middle node, or with a middle node within
+    STRAIGHT edge lengths of the chord. In triangles with two edges on one curve, which has no corner there, the third
+    edge flips.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -178,7 +180,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2) onto a circle, and side nodes along the side; None if impossible."""
+    """Move points (k, 2) onto a circle, side nodes along the side; None for corners and nodes that cannot reach it."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -209,7 +211,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(matrix, np.ones(len(x)), rcond=None)
     A = np.array([[xx, xy / 2], [xy / 2, yy]])
     values, axes = np.linalg.eigh(A)
-    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # but for rounding, the conic may be a parabola
+    if values[0] <= np.sqrt(np.finfo(float).eps) * values[1]:  # up to rounding, the conic may be a parabola
         return None
     centre = -np.linalg.solve(A, [bx, by]) / 2
     level = 1 + centre @ A @ centre
@@ -219,7 +221,7 @@ def fit_ellipse(places: Float) -> Ellipses | None:
 
 
 def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether a chain of positions (k, 2) is on an ellipse F, with steps |F^-1 d| <= 1."""
+    """Return whether a closed chain of positions (k, 2) lies on an ellipse, in steps of at most 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))

@@ -69,7 +69,7 @@ class Grid:
             raise MeshError(*(f"cell data {name}: {size} values for {m} cells" for name, size in sizes.items()))
 
     def nodes_of(self, cells: Int, count: int) -> Int:
-        """Return the first `count` nodes (k, count) of each cell (k,), as numbered in the file."""
+        """Return the first `count` nodes (k, count) of each cell (k,), with the numbers in the file."""
         starts = (np.cumsum(self.counts) - self.counts)[cells]
         return np.asarray(self.first + self.nodes[starts[:, None] + np.arange(count)], np.int64)
 

@@ -86,7 +86,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Read the nodes of all cells, and the node count of each cell."""
+    """Read the nodes of all cells, and the node count of each cell.  Raises MeshError."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
@@ -102,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Yield name, values and width of the arrays for `length` points or cells in a section."""
+    """Yield name, values and width of the arrays in a section for `length` points or cells; skip colour tables."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -126,7 +126,7 @@ def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Itera
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read triangles and lines from a Medit file, which numbers nodes and cells from 1.
+    """Read triangles and lines, numbered from 1, from a Medit file; skip other known sections.
 
     Raises:
         OSError: the file cannot be read.
@@ -185,18 +185,18 @@ class Scanner:
         return "" if match is None else match[0].decode(errors="replace")
 
     def follows(self, word: str) -> bool:
-        """Return whether the next word is `word`."""
+        """Return whether the next word, in capitals, is `word`."""
         match = WORD.search(self.content, self.place)
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Convert a word into a number of values."""
+        """Convert a word into a number of values; MeshError for any other word."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Read an array (count,) of the VTK type `name`."""
+        """Read an array (count,) of the VTK type `name`; MeshError for missing or wrong values."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
@@ -220,6 +220,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the number of the current line."""
+        """Raise MeshError, with the number of the current line of a text file."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")

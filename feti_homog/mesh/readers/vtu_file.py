@@ -79,7 +79,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Group the children of an XML element by tag; MeshError for unknown and missing children."""
+    """Group the children of an XML element by tag; MeshError for unknown, missing or repeated children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -93,7 +93,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 class _Arrays:
-    """A decoder of arrays in the format of an XML root, up to `budget` decompressed bytes."""
+    """A decoder of arrays in the format of an XML root, up to `budget` decompressed bytes; raises MeshError."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -153,7 +153,7 @@ class _Arrays:
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Unpack the data that follow a header of lengths.  Raises ValueError or IndexError if data are missing."""
+        """Unpack data behind a header of lengths; ValueError or IndexError for short data, MeshError above `budget`."""
         header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
         count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
         lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []

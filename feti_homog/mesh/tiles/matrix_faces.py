@@ -1,7 +1,7 @@
-"""Represent the matrix between discs by the faces of a planar graph, whose lines are bridges and cell sides.
+"""Represent the matrix between discs by the faces of a planar graph of bridges and cell sides.
 
 A bridge is a straight line across the matrix between the facing points of neighbouring discs, normal to both circles.
-In a narrow gap, a bridge is about as long as the edges of the mesh, and allows good triangles.
+In a narrow gap, the length of a bridge is about the edge size of the mesh, which allows good triangles.
 
 The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from each end.
 A half-line leaves a disc in the direction of the start point on the circle.
@@ -33,7 +33,7 @@ class CentreLines:
 
     Attributes:
         ends: (e, 2) discs.
-        angle: (e,) direction from the first to the second disc.
+        angle: (e,) direction from the first to the second disc, in radians.
         gap: (e,) distance between the circles.
         facing: (e, 2, 2) the point on each circle that faces the other circle.
         clearance: (e,) least distance between the line and the centre of a third disc / radius of that disc.
@@ -47,7 +47,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR."""
+    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR.  Raises QhullError."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -119,7 +119,7 @@ class HalfLines:
         node: (h,) start node.
         angle: (h,) direction of the start point from the node centre, in [0, 2 pi).
         start: (h, 2) start point.
-        twin: (h,) the other half-line of the same line.
+        twin: (h,) the other half-line of the line.
     """
 
     node: Int
@@ -170,7 +170,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,).
 
-    `label` (h,) has the label of the next half-line clockwise, `alone` (n,) the label of a disc without half-lines.
+    It is the `label` (h,) of the next half-line clockwise, or `alone` (n,), if not -1, of a disc without half-lines.
     """
     order = np.lexsort((lines.angle, lines.node))
     node, line_angle = lines.node[order], lines.angle[order]

@@ -62,7 +62,7 @@ class Filling:
 
 @contextmanager
 def gmsh_session() -> Iterator[ModuleType]:
-    """Run gmsh in a context, silently, with fixed options and an empty model."""
+    """Context manager: run gmsh silently, with fixed options and an empty model."""
     import gmsh
 
     gmsh.initialize(["gmsh", "-v", "0", "-skip_petscrc"], False, interruptible=False)  # gmsh starts PETSc
@@ -87,7 +87,7 @@ def fill(tile: Tile) -> Filling:
         surfaces, circle, within = _add_surfaces(gmsh, tile)
         if tile.is_graded:
             # The element size is h + g d at the distance d from the nearest outline edge, of length h. Otherwise gmsh
-            # would interpolate between the lines: a disc would be as fine inside as on the circle.
+            # would interpolate between the lines, and elements inside a disc would have the size on the circle.
             field = gmsh.model.mesh.field
             extended = field.add("Extend")
             field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
@@ -139,7 +139,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
     """Add the surfaces of all regions to gmsh.
 
     Each outline edge is a line with one element, and node n is point n + 1. Returns the surface tags, the circle
-    around each surface or MATRIX, and the total area.
+    around each surface or MATRIX, and the total area. Raises MeshError if a hole lies in no surface.
     """
     curves, geo = tile.curves, gmsh.model.geo
     for tag, (x, y) in enumerate(tile.points.round(arrangements.GMSH_DECIMALS).tolist(), 1):

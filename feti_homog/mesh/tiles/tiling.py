@@ -67,7 +67,7 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
 
 
 def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
-    """Tile a large cell with round fibres; None for other cells, or without room for bridges.
+    """Tile a large cell with round fibres; None for other cells, or if bridges do not divide the matrix.
 
     `largest` is the element size; `marks` become nodes, which bridges avoid.
     """

@@ -13,4 +13,4 @@ __all__ = ["Conics", "Discs", "Ellipses", "Outlines", "convex_sums", "directions
 if TYPE_CHECKING:
     from feti_homog.microstructure.shapes.convex_sums import Outlines
 else:
-    Outlines = object  # cells without polygons do not load sums of them
+    Outlines = object  # cells without polygons do not load `convex_sums`

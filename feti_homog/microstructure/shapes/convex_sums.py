@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs, by Steiner's formula A + P r + pi r^2 for a core and disc of radius r."""
+        """The radii (k,) of equal-area discs.  The area is A + P r + pi r^2 (Steiner; core area A, perimeter P)."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -60,7 +60,7 @@ class ConvexSums(ConvexCurves):
         return replace(self, frames=frames)
 
     def support(self, normal: Float) -> Float:
-        """Return the support functions max_v v . n + |F^T n| (k, ...) at unit vectors n (k, ..., 2)."""
+        """Return the supports (k, ...) at unit vectors n (k, ..., 2): max_v v . n + |F^T n| over corners v of V."""
         core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
@@ -80,14 +80,14 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) at vectors (n, k, 2) from the centres, by at least POINTS boundary points."""
+        """Return the distances (n, k) at vectors (n, k, 2) from the centres, to POINTS or more points of outlines."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, q, 2) whose outward normals are n (k, q, 2)."""
+        """Return the points (k, q, 2) with the outward normals n (k, q, 2)."""
         corner = np.einsum("kmi,kqi->kqm", self.cores, normal).argmax(axis=2)
         turned = np.einsum("kij,kqi->kqj", self.frames, normal)
         length = np.linalg.norm(turned, axis=2, keepdims=True)
@@ -129,11 +129,11 @@ class PolygonalRows:
     columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
-        """Return which rows (N,) have sides."""
+        """Return the mask (N,) of rows with sides."""
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
+        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
         (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
         are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
         yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"

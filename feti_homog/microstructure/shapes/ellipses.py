@@ -25,7 +25,7 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Build ellipses with semi-axes a, b (k,); a lies at `angle` (k,) in degrees."""
+        """Build ellipses with semi-axes a, b (k,); a has the direction `angle` (k,), in degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
@@ -56,7 +56,7 @@ class Ellipses(ConvexCurves):
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Lengthen both semi-axes by `thickness` (k,)."""
+        """Lengthen both semi-axes, the columns of F, by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -103,7 +103,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the parameters (k,) at which rays from the centres along d (k, 2) intersect the ellipses."""
+        """Return the parameters (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
@@ -128,7 +128,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, like `ConvexSums.parting`."""
+        """Find the directions that best separate pairs, and both supports; see `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -139,7 +139,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, 2) whose outward normals are n (k, 2)."""
+        """Return the points (k, 2) with the outward normals n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
@@ -178,11 +178,11 @@ class EllipticRows:
     )
 
     def given(self, rows: Columns) -> Bool:
-        """Return which rows (N,) have two different semi-axes."""
+        """Return the mask (N,) of rows with two different semi-axes."""
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the faults of rows with this shape: a mask of rows (N,), and a message."""
+        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
         a, b = rows["a"], rows["b"]
         thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
         yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"
@@ -264,4 +264,4 @@ class Discs(ConvexCurves):
 
 
 Conics = Discs | Ellipses
-"""Outlines whose meshes may have nodes at the tips of debonded arcs."""
+"""Outlines that may have nodes at the tips of debonded arcs in meshes."""

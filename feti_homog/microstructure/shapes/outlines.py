@@ -55,17 +55,17 @@ class ConvexCurves:
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Append other outlines, whose cores have the same number of corners."""
+        """Append other outlines; all cores have one number of corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
-        """Apply a function to every field, jointly with the same field of other curves."""
+        """Apply a function to every field, together with this field of other curves."""
         names = [field.name for field in fields(self)]
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 
 
 class ColumnRange(NamedTuple):
-    """The numbers that a table column allows: value of an empty cell, and bounds."""
+    """The numbers in a table column: value of an empty cell, and lower bounds, inclusive and exclusive."""
 
     empty: float
     least: float = -np.inf

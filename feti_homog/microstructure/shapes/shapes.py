@@ -24,7 +24,7 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes in a table whose meshes may have tip nodes or, unless `has_tips`, have none."""
+    """Return the shapes in a table that allow mesh nodes at tips or, unless `has_tips`, that do not."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
@@ -57,8 +57,8 @@ def outlines_of(rows: Columns) -> Outlines:
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
     """Replace parts of N outlines.
 
-    A part is a mask (N,) and the new outlines of the masked rows.  Returns `Discs` or `Ellipses` if the class can
-    represent all outlines, else `ConvexSums`.
+    A part is a mask (N,) and the new outlines of the masked rows.  Returns `outlines` if all masks are empty, `Discs`
+    or `Ellipses` if the class can represent all outlines, else `ConvexSums`.
     """
     parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
