@@ -212,8 +212,8 @@ class Peak:
     fibre: int | None = described("fibre of the most utilised bond at the peak, from 1", default=None)
     angle: float | None = described("direction of that bond from the centre", records.DEGREES, default=None)
     stress_left: float | None = described(
-        "stress in the valley of the fall, on a path of one leg with a load that only rises; absent if the stress "
-        "never falls by 1 % as bonds break",
+        "stress in the valley of the fall, on a path of one leg with a load that only rises; with friction "
+        "approximate, by branches through zero; absent if the stress never falls by 1 % as bonds break",
         records.STRESS,
         default=None,
     )
