@@ -54,7 +54,7 @@ class CheckRecorder:
         jump = without if error is None else f"relative jump {error:.1e}"
         line = f"{state.iterations or 'no'} iterations, {jump}"
         if response.debonded:
-            line += f", {response.debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
+            line += f", {response.debonded} debonded ({response.counts['closed']} closed), solves: {state.solves}"
         if state.free_motions:
             line += f", {state.free_motions} free motions"
         if state.solution.reason < 0:

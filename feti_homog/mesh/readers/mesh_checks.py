@@ -231,7 +231,7 @@ def islands(raw: RawMesh, torus: Torus) -> list[str]:
     part = components(len(raw.triangles), *torus.sides[:2])
     loose = np.flatnonzero(part != np.bincount(part).argmax())
     first = loose[np.unique(part[loose], return_index=True)[1]]
-    return _listed("floating parts, which voids part from all others: that with ", first, raw.element)
+    return _listed("floating parts, separated from all others by voids: the part with ", first, raw.element)
 
 
 def void_faults(raw: RawMesh, torus: Torus, has_voids: bool) -> list[str]:
