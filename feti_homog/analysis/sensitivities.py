@@ -1,4 +1,4 @@
-"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to phase and spring constants."""
+"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to constants of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -164,7 +164,7 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check prescribed strains, stresses and temperature, relative to `scales` of strain and stress."""
+    """Check prescribed strains and stresses relative to `scales`, and the temperature T relative to max(|T|, 1)."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
     values, by_stress = load.values[:v], load.by_stress[:v]
     findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")

@@ -106,7 +106,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """Compute K, delta_0 and stretch, all (k,), in modes psi (k,)."""
+        """Compute K, delta_0 and stretch, all (k,), at the mode angles psi (k,): 0 for opening, pi / 2 for slip."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt

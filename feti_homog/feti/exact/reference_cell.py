@@ -94,7 +94,7 @@ class AssembledSchur:
 
 
 def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_matrix | Float:
-    """Sum Z^T S Z (m, m) over all ranks for Z (n, m).  Collective.
+    """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs (`with_springs`).  Collective.
 
     The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
     `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.

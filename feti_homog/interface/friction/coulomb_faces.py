@@ -78,10 +78,10 @@ class StatusSearch:
         return result is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
-        """Correct wrong statuses by at most `solves` pivots; by default SOLVES and one for each status of each node.
+        """Correct wrong statuses by pivots: return the statuses with x, and whether the forces balance.
 
-        Return the statuses and x, or None without an end, and whether the forces balance.  After some block pivots
-        without progress, one random node changes at a time: a fixed order may end in a cycle.
+        Returns (None, False) after `solves` pivots, by default SOLVES + 4 n.  After some block pivots without progress,
+        one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves or SOLVES + self.allowed.size):
