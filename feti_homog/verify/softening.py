@@ -1,7 +1,7 @@
 """Evaluate cohesive laws t(delta) of the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
-K is the stiffness of a mode, with opening delta_n, slip delta_s: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t
-delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
+K is the stiffness of a mode psi, 0 (opening delta_n) to pi/2 (slip delta_s): K (delta_n^2 + delta_s^2) = k_n delta_n^2
++ k_t delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
 """
 
 from abc import abstractmethod
@@ -106,7 +106,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """Compute K, delta_0 and stretch, all (k,), at the mode angles psi (k,): 0 for opening, pi / 2 for slip."""
+        """Compute K, delta_0 and stretch, all (k,), in modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt

@@ -1,6 +1,6 @@
 """The adaptive coarse space: rigid-body motions and soft subdomain modes, averaged over node copies.
 
-After elimination of the coarse displacements Z_0 (`geneo.AveragedModes`), the boundary stiffness S becomes
+Eliminating the coarse displacements Z_0 (`geneo.AveragedModes`) turns the boundary stiffness S, with springs, into
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
@@ -98,7 +98,7 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """Compute S Z_0 and Z_0^T S Z_0 on subdomains `which`; `BW` are their scaled constraints."""
+        """Store S Z_0 and Z_0^T S Z_0 of the local subdomains `which`; `BW` are their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)

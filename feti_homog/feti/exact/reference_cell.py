@@ -31,8 +31,8 @@ from feti_homog.typing import Float, Int
 class AssembledSchur:
     """The assembled Schur complement Z^T S Z of all subdomains; every rank has the whole factor.
 
-    Boundary displacements u = Z y have no jump on active rows, B Z = 0: all copies of a node move together, but at
-    inactive rows the copies of the inner body move independently.
+    S includes springs (`with_springs`).  Boundary displacements u = Z y have no jump on active rows, B Z = 0: all
+    copies of a node move together, but at inactive rows the copies of the inner body move independently.
 
     Attributes:
         size: number of columns of Z, over all ranks.

@@ -83,7 +83,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Return the break mode (p, d) under tractions (p, c): shares of strengths, or psi; see `break_names`."""
+        """Return the mode of breaks (p, d) under tractions (p, c): shares of strengths, or mode angles in degrees."""
 
     @classmethod
     @abstractmethod

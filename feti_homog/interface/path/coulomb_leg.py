@@ -83,7 +83,7 @@ class CoulombLeg(Leg):
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the current statuses, x and macroscopic state.  Add the energies since the last state."""
+        """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the next leg fraction, and the error that limits it; None for all of `share`, even if stuck."""
+            """Return the next leg fraction, and the error that limits it; (`share`, None) also if no statuses fit."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -109,7 +109,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Yield a point and break the worst bonds, until none is overloaded.  Collective; `is_due`: at least once."""
+        """Yield a point and break the worst bonds until none is overloaded, at least once if `is_due`.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)

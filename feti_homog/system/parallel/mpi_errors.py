@@ -102,7 +102,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print the exception of this rank, and end the processes of all ranks."""
+    """Print the exception of this rank, and abort the processes of all ranks with its exit code; never returns."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
