@@ -83,7 +83,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Build the entry `sensitivities` from values, and from their derivatives (`columns`) by parameter."""
+    """Build the entry `sensitivities` from values, derivatives (`columns`) by parameter, and `at_fixed_status`."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),

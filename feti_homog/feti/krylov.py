@@ -117,7 +117,7 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Return DIVERGED_BREAKDOWN if a stall ends the solve, else ITERATING."""
+        """Return DIVERGED_BREAKDOWN if the norm has `stalled` and a stall ends the solve, else ITERATING."""
         if stalled and self.ends_on_stall:
             return REASON.DIVERGED_BREAKDOWN
         return REASON.ITERATING

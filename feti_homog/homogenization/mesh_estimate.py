@@ -143,8 +143,8 @@ def _recovered(
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
     """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
-    On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
-    displacements at the coarse nodes instead; the estimates are hardly smaller.
+    On a coarser `lattice` each subdomain has a new equilibrium, with stored factors if `keep`.  Subdomains across
+    materials take the fine displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)

@@ -127,7 +127,7 @@ class FitReader:
             self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Read the points of a measured curve from its file.  Returns [] after a fault."""
+        """Read the points of a measured curve from its file.  Returns [], and adds a line to `faults`, for a fault."""
         measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []

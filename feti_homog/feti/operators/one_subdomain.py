@@ -86,7 +86,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by a symmetric matrix: `diagonal` (n,), and the lower or upper triangle of the array.
+        """Multiply x by a symmetric matrix, `diagonal` (n,) and a triangle (`lower` 0 or 1), into `out` if given.
 
         A product is fastest for x in Fortran order.
         """

@@ -109,7 +109,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to new statuses and scaled x.  Energy losses are per area."""
+        """Advance on a straight path to new statuses and scaled x; add the work and the losses, energies per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))

@@ -145,7 +145,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
 def _material(
     document: Document, symmetry: str, compliance: Float, expansion: Float | None, errors: Mapping[str, float]
 ) -> EffectiveMaterial:
-    """Return a material with the name, version and unit of a result."""
+    """Return a material with the name, version and unit of a result; the expansion may be None."""
     case, unit = document["case"], document["case"]["output"]["stress_unit"]
     return EffectiveMaterial(case["name"], document["version"], unit, symmetry, compliance, expansion, errors)
 
