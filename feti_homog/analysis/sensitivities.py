@@ -107,7 +107,7 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 
 
 def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, float]:
-    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, by name."""
+    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, if any, by name."""
     entries = {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
