@@ -1,4 +1,4 @@
-"""The solution of the dual problem under one load, and the jumps on active rows."""
+"""The solution of the dual problem under one load, and the jumps on active rows; symbols as in `solver`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

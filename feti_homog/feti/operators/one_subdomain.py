@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T, or K_ii if the subdomain is pinned and has no boundary; `dofs` (n,) are ascending.
+        """Factor K + rho Rf Rf^T (`fixing`), or K_ii if pinned and without boundary; `dofs` (n,) are ascending.
 
         Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
         """
