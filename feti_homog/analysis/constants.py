@@ -247,7 +247,7 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note a mesh error above `accuracy` under the first load that is not zero.  Collective."""
+    """Note a mesh error above `accuracy`, if any, under the first nonzero load, if the cell carries it.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

@@ -105,7 +105,7 @@ class JumpOperator:
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows, or x itself.  Collective."""
+        """Sum x (local rows,) or (local rows, k) to owned rows; return x itself if layouts agree.  Collective."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:

@@ -89,7 +89,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break, if any.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
