@@ -142,7 +142,7 @@ class FitReader:
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
-        """Read a table into a dataclass; return None for a faulty table."""
+        """Read a table into a dataclass; return None for a faulty table, with lines in `faults`."""
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None

@@ -44,7 +44,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 
 
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
+    """Call a function on every rank, and return its result; if a rank raises, every rank raises.  Collective.
 
     `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
     A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
