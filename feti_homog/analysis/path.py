@@ -236,7 +236,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a path point by products with the dual operator, and check its responses.  Collective."""
+    """Complete a path point by products with the dual operator, and check its responses; return both.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:
