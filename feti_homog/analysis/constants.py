@@ -102,7 +102,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     """Return a radius for each fibre phase, or None if closed forms do not apply.
 
-    Closed forms need round fibres without coatings, the same bonds for all phases and, with springs, equal radii in a
+    Closed forms need round fibres without coatings, the same bonds for all phases and, with springs, one radius a
     phase.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
@@ -187,8 +187,8 @@ def _note_bounds(
 ) -> None:
     """Note constants outside their bounds; record a fault for each that no mesh error explains.
 
-    The relative error of a constant is at most `energy`, the largest relative error of the strain energy; true errors
-    are at most OFF times the estimates.  A bound applies only if the cell has the symmetry that the bound assumes.
+    The error of a constant is at most OFF times its estimate or, if larger, OFF `energy` times the constant, with the
+    largest relative energy error `energy`.  A bound applies only if the cell has the symmetry that the bound assumes.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")
@@ -206,7 +206,7 @@ def _note_bounds(
 def note_outside(
     context: AnalysisContext, limits: Mapping[str, Sequence[float]], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note each value outside its limits; record a fault if no mesh error explains the excess.
+    """Note each value outside its limits; record a fault if the excess is more than the error in `_note_bounds`.
 
     The limits bound constants of periodic cells; the function skips cells with other boundaries.
     """
@@ -247,7 +247,7 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note a mesh error above `accuracy` under the first load that is not zero.  Collective."""
+    """Note a mesh error above `accuracy`, if any, under the first nonzero load, if the cell carries it.  Collective."""
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

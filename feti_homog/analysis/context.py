@@ -206,7 +206,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the entries of a point: debonding under the last plane response, and iterations.  Collective."""
+        """Return all iterations, and the debonding under the last plane response, by result.json names.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

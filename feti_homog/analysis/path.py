@@ -95,9 +95,9 @@ def _points(
 ]:
     """Yield each point with its responses.  Collective.
 
-    Points come first from the checkpoint, with the numbers that `path_events.restored` adds, then from the load path.
-    The path ends with a fault where the cell no longer carries the stresses, or where friction has no equilibrium.
-    Raises NotCarriedError if the cell does not carry the stresses of the first point.
+    First come the `stored_events` of the checkpoint, with the numbers that `path_events.restored` adds, then the load
+    path, without.  The path ends with a fault where the cell no longer carries the stresses, or friction has no
+    equilibrium. Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))
@@ -236,7 +236,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a path point by products with the dual operator, and check its responses.  Collective."""
+    """Complete a path point by products with the dual operator, and check its responses; return both.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

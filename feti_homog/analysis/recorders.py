@@ -112,7 +112,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record labelled states.  A state has a response, or None, for each problem.  Collective."""
+        """Record states by label, with a response or None for each problem, if `is_recording`.  Collective."""
         if not self.is_recording:
             return
         fields = recovered_fields.recover(self._cell, [*states.values()])

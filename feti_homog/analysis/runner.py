@@ -62,11 +62,11 @@ def run(
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
-    """Return the result of a case on every rank, without files.  Collective.
+    """Return the result of a case on every rank, with fields if `keep_fields`, without files.  Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
-        ConvergenceError: a solve did not converge or a check failed.
+        ConvergenceError: a solve did not converge or a check failed; the summary is printed before, unless `quiet`.
     """
     progress = standard_streams.Progress(comm, quiet)
     with _torn(case, comm, progress) as cell:
@@ -107,7 +107,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) 
 def _run_and_write(
     cell: unit_cell.TornCell, directory: Path, progress: standard_streams.Progress, resume: bool, keep_fields: bool
 ) -> Result:
-    """Analyse a torn cell, write the files, and return the result.  Collective.  Raises FetiHomogError."""
+    """Analyse a torn cell like `run`, write the files, and return the result.  Collective.  Raises FetiHomogError."""
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:

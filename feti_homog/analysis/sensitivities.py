@@ -1,4 +1,4 @@
-"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to phase and spring constants."""
+"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to constants of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -83,7 +83,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 def _entry(
     values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
 ) -> dict[str, Any]:
-    """Build the entry `sensitivities` from values, and from their derivatives (`columns`) by parameter."""
+    """Build the entry `sensitivities` from values, derivatives (`columns`) by parameter, and `at_fixed_status`."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),
@@ -107,7 +107,7 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 
 
 def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, float]:
-    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, by name."""
+    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, if any, by name."""
     entries = {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 

@@ -129,7 +129,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
-    """Append the faults of shapes and hollow fibres to `faults`."""
+    """Append the faults of shapes to `faults` or, if there are none, the faults of hollow fibres."""
     from feti_homog.microstructure.shapes import shapes  # few cases need it
 
     rows, before = table.columns, len(faults)

@@ -73,7 +73,7 @@ def sized(
     free_faces: bool,
     faults: list[str],
 ) -> Cell:
-    """Set mesh size, refinement and element order of a cell by its accuracy.
+    """Return the cell with mesh size, refinement and element order that follow from its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
     `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Without an accuracy, only the

@@ -110,7 +110,7 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate affine coarse triangles `part` (t,) on the unit triangle; `mixed` is the stiffness of mixed elements.
+    """Integrate affine coarse triangles `part` (t,) on the unit triangle; `mixed` is None or mixed elements' stiffness.
 
     Returns:
         Stiffness blocks (t, p, c^2) of the node couples, integrals (t, q, 2) of the gradients, and the total area.

@@ -47,7 +47,7 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
     """Compute the physical shape function gradients (e, q, a, 2) in elements with nodes (e, a, 2).
 
-    The second result is the quadrature weights times the Jacobian determinant (e, q).
+    The second result is the quadrature weights times the Jacobian determinant (e, q).  `with_bubble` adds the bubble.
     """
     nodes = corners.shape[1]
     reference, weights = quadrature(nodes + with_bubble)
@@ -199,7 +199,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute the fields in elements with nodes and displacements (e, a, 2), and with the stiffness L (3, 3)."""
+    """Compute the fields in elements, mixed if `is_mixed`, with nodes and displacements (e, a, 2), L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))

@@ -202,7 +202,7 @@ class RecoveredStress:
         """Compute the energy of the difference ds between recovered and element stresses.
 
         Returns:
-            int ds_i : S : ds_j (k, k), S the flexibility; element shares (e, k) of its diagonal, (0, k) without shares.
+            int ds_i : S : ds_j (k, k), S the flexibility; its diagonal (e, k) by element, (0, k) if not `with_shares`.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]

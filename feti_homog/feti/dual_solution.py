@@ -1,4 +1,4 @@
-"""The solution of the dual problem under one load, and the jumps on active rows."""
+"""The solution of the dual problem under one load, and the jumps on active rows; symbols as in `solver`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -122,7 +122,7 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Superpose k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
+        """Return the sum of k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
 
         If a solution lacks alpha, so does the result, with iterations and residual of the first solution.
         """

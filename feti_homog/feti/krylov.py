@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced`.  F includes the compliance C of springs.
+H is the preconditioner, M^-1 or H_0 of `coarse.adaptive`, P the projector of `coarse.natural`; F includes springs, C.
 
 A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
 iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.
@@ -117,7 +117,7 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Return DIVERGED_BREAKDOWN if a stall ends the solve, else ITERATING."""
+        """Return DIVERGED_BREAKDOWN if the norm has `stalled` and a stall ends the solve, else ITERATING."""
         if stalled and self.ends_on_stall:
             return REASON.DIVERGED_BREAKDOWN
         return REASON.ITERATING

@@ -215,7 +215,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """The matrix nu = (B B^T)^-1 B N (owned rows, m), with int eps* = nu^T B u.  Collective when first read."""
+        """The matrix nu = (B B^T)^-1 B N (owned rows, m): int eps* = N^T u = nu^T B u.  Collective when first read."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)

@@ -46,7 +46,7 @@ class EnergyErrors:
             spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
         shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
-        least_of_two: least ratio, off the diagonal, of an error to the geometric mean of two |elements| + |arcs|.
+        least_of_two: least ratio of an error i != j to sqrt(a_i a_j), a = |elements_ii| + |arcs_ii|.
     """
 
     elements: Float
@@ -143,8 +143,8 @@ def _recovered(
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
     """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
-    On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
-    displacements at the coarse nodes instead; the estimates are hardly smaller.
+    On a coarser `lattice` each subdomain has a new equilibrium, with stored factors if `keep`.  Subdomains across
+    materials take the fine displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)

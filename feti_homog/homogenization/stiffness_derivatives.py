@@ -1,4 +1,4 @@
-"""Differentiate stiffness and conductivity with respect to phase and interface constants, without further solves.
+"""Differentiate stiffness and conductivity with respect to constants of the case, without further solves.
 
 Let e_i be the strains under the unit load i, followed by the other uniform loads.  The stiffness of a linear cell is
 

@@ -103,7 +103,7 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """The operator from displacements to the multipliers that keep each part in equilibrium."""
+    """The operator from displacements to multipliers that keep parts in equilibrium; B is the parts' jump operator."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble stiffness K and load forces Q of the coarse triangles at shared nodes.  Collective."""

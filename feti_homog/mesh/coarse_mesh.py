@@ -169,7 +169,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find the triangles (b,) with two edges on one circle, and the corner (b,) between the two edges."""
+    """Find the triangles (b,) with two edges on one circle, and the corner (b,) between them, among `nodes` nodes."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

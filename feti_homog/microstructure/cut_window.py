@@ -21,11 +21,11 @@ def moves(outlines: Outlines, size: Float) -> Float:
     """Compute the moves d (N, 2) that separate outlines across the border of the torus.
 
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2. Gaps across the border become at
-    least the smallest gap inside the window, clipped to the range LEAST_GAP to MOST_GAP; gaps inside keep this value
-    or, if less, their own. Gaps are relative to the sum of the radii. Each step replaces the constraints |v| >= r on
-    vectors v between centres by n . v >= r, with the present directions n; since n . v <= |v|, its solution satisfies
-    the constraints. Outlines other than discs have the radii of equal-area discs; n is the direction of the largest gap
-    n . v - r, where r is the sum of both supports along n.
+    least the smallest gap inside the window, clipped to the range LEAST_GAP to MOST_GAP; gaps inside stay at least as
+    large as this gap or, if they are smaller, as they were. Gaps are relative to the sum of the radii. Each step
+    replaces the constraints |v| >= r on vectors v between centres by n . v >= r, with the present directions n; since n
+    . v <= |v|, its solution satisfies the constraints. Outlines other than discs have the radii of equal-area discs; n
+    is the direction of the largest gap n . v - r, where r is the sum of both supports along n.
 
     Raises:
         MeshError: the torus has no room for such moves, or they do not settle in MAX_STEPS steps.

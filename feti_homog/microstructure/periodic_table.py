@@ -25,7 +25,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     """Arrange the fibres of a table, in row order, and then the voids.
 
     If several rows list images of one fibre, the first row counts. In a cut window, fibres that overlap across the
-    border are moved apart.
+    border are moved apart. With `repairs`, fibres that overlap slightly shrink first.
 
     The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
     so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), and
@@ -198,7 +198,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows without an earlier image, all in a cut window, and the faults of images."""
+    """Return the mask (N,) of rows without an earlier image (all rows if `is_cut`), and the faults of images."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])

@@ -126,7 +126,7 @@ class SourceColumn:
     value: Callable[[float], float]
 
     def read(self, word: str, delimiter: str | None) -> float | str:
-        """Convert a numeric table entry; return any other entry, or a phase, unchanged."""
+        """Convert a numeric entry of a table with this delimiter; return any other entry, or a phase, unchanged."""
         number = None if self.name == "phase" else number_of(word, delimiter)
         return word if number is None else self.value(number)
 
@@ -165,7 +165,7 @@ def misspelt(word: str, missing: Sequence[str]) -> str:
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Convert a word to a number, with a decimal point or comma; None if the word is no finite number."""
+    """Convert a word to a number, with a decimal point, or comma unless it is the delimiter; None if not finite."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

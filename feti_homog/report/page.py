@@ -63,7 +63,7 @@ def write(directory: Path) -> Path:
 
 
 def page(document: Document, directory: Path) -> str:
-    """Return the HTML page of a result.
+    """Return the HTML page of a result, with the cards of all formats that can carry its material.
 
     Raises OSError, KeyError, TypeError or ValueError if a result file is missing or damaged.
     """

@@ -40,7 +40,7 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 
 def require_tables(path: Path, state: int | None) -> None:
-    """Check result.h5 in this process.  Raises like `require_own`."""
+    """Check links, sizes, layout and numbers of result.h5 in this process; arguments and errors as in `require_own`."""
     room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # bytes left for views, and for tables
     try:
         with h5py.File(path, "r", locking=False) as file:

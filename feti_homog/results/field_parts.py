@@ -144,7 +144,7 @@ def _at_nodes(
     in_plane: recovered_fields.NodalFields,
     along: recovered_fields.NodalFields | None = None,
 ) -> dict[str, Any]:
-    """Return displacements, and the fields at interface nodes, by their dataset names.
+    """Return displacements, and the fields at interface nodes, by their dataset names; without `along`, u_3 = 0.
 
     If subdomains extend across materials, all interface nodes are bonded.
     """

@@ -87,7 +87,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
-    """Describe the bond of a landmark by fibre and direction, or "" if unknown.  `title` is such as "first_break_"."""
+    """Describe the bond of a landmark by fibre and direction, or "" if unknown; `title` begins its keys in `peak`."""
     if peak.get(f"{title}fibre") is None:
         return ""
     return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"

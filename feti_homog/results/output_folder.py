@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about the different result that a run of `case` replaces, or "".  Call on one rank.
+    """Return a line about the other, or unreadable, result that a run of `case` replaces, or "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -228,7 +228,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove result files that are not in `written`, and events if no log is written.  Call on one rank."""
+    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank."""
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

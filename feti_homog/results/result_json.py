@@ -156,8 +156,7 @@ def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
 class EventLog:
     """The event log in a result folder, which rank 0 writes.
 
-    The first line replaces an earlier log.  After a write error, `say` gets a warning, and the path continues without
-    it.
+    The first line replaces an earlier log.  After a write error, `say` gets a warning, and the log drops later lines.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:

@@ -101,9 +101,9 @@ def write(directory: Path) -> list[Path]:
 
 
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
-    """Return load factor, mean strain and mean stress of a state as rows (1, c).
+    """Return, by name, the load factor, mean strain and mean stress of a state as rows (1, c).
 
-    The means are vectors [11, 22, 12] or, for states that are not plane, tensors; the temperature is then added.
+    Plane states have vectors with gamma12; other states have tensors (c = 9) with E12, and the temperature.
     """
     names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
     if "temperature" in attributes:

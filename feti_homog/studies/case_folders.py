@@ -112,7 +112,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the sweep folder, or extend its case list.  On one rank.
 
     Raises:
-        CaseError: the folder holds another sweep, or foreign files under the file names of a sweep.
+        CaseError: the folder cannot be made, or holds another sweep, or foreign files under the file names of a sweep.
         FetiHomogError: the folder cannot be written.
     """
     try:

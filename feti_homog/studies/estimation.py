@@ -160,7 +160,7 @@ def summarize(
 
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0) -> list[str]:
-    """Return a message for each undetermined direction; `rows` has the numbers of its unknowns.
+    """Return a message for each undetermined direction, with the unknowns in its row of `rows` (indices of `names`).
 
     `teeth` counts the teeth of a softening law, 0 for other laws.
     """

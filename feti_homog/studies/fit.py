@@ -198,7 +198,7 @@ class Evaluations:
         return search(np.array(min(self.computed, key=squares, default=start)))
 
     def values(self, x: Float) -> Float:
-        """Return the computed data (m,) at the unknowns x (n,).  On rank 0."""
+        """Return the data (m,) at the unknowns x (n,); compute and store them at the first call for x.  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:

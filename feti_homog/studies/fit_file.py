@@ -127,7 +127,7 @@ class FitReader:
             self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Read the points of a measured curve from its file.  Returns [] after a fault."""
+        """Read the points of a measured curve from its file.  Returns [], and adds a line to `faults`, for a fault."""
         measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []
@@ -142,7 +142,7 @@ class FitReader:
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
-        """Read a table into a dataclass; return None for a faulty table."""
+        """Read a table into a dataclass; return None for a faulty table, with lines in `faults`."""
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None

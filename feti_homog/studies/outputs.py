@@ -20,7 +20,7 @@ Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Return the indices i and j in the column names Cij of a sweep.
+    """Return the indices i and j in the column names Cij of a sweep; a plane state may be None.
 
     If one of the plane states is generalized plane strain, Cij denotes the same entry in all cases.
     """

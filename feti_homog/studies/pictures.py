@@ -84,7 +84,7 @@ def moduli_figure(table: SweepTable) -> Figure:
 
 
 def _limit(axes: Axes, is_wide: bool) -> None:
-    """Limit the ordinate to the computed values and to bounds, unless the bounds are wide."""
+    """Limit the ordinate to the computed values and the bounds, without Reuss' and Voigt's bounds if `is_wide`."""
     shapes = [shape for shape in axes.collections if not (is_wide and shape.get_label() == "Reuss to Voigt")]
     corners = [np.asarray(path.vertices)[:, 1] for shape in shapes for path in shape.get_paths()]
     values = np.concatenate([*(np.asarray(line.get_ydata(), float) for line in axes.lines), *corners])

@@ -99,6 +99,7 @@ def cases_at(
 
     Args:
         folder: file names in the document are relative to this folder.
+        realisations: as in `case_documents`.
         section: name of the section that defines the points, for messages.
         faults: faults of the points.
         complete: sets further keys in the document of every case.
@@ -148,10 +149,9 @@ def case_documents(
     faults: list[str],
     section: str = sections.SWEEP,
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
-    """Return the sweep cases, unchecked, with their documents.
+    """Return the sweep cases, unchecked, with their documents; [] after faults, which are appended to `faults`.
 
-    The cases run through all points; further realisations follow, only of points with a random cell.  Faults of the
-    points and of the realisations are appended to `faults`.
+    The cases run through all points; further `realisations`, if not None, follow, only of points with a random cell.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
     if realisations is not None and not any(map(_is_random, documents)):

@@ -108,7 +108,7 @@ class SweepTable:
         return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
-        """Return a label with the inputs of a point, except seeds and the keys in `without`."""
+        """Return a label with the varying inputs of a point, except seeds and the keys in `without`."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         labels = []

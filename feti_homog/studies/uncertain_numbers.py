@@ -51,7 +51,7 @@ class Uncertainty:
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers from a document, which keeps their means.  Faults are appended to `faults`."""
+    """Extract the uncertain numbers from a document, which keeps their means; none after faults, added to `faults`."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY

@@ -100,7 +100,7 @@ def checks_of(cell: DiscreteCell) -> list[Finding]:
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
-    """Check mesh, interface and the fields of all states.  Returns the states without mesh fields."""
+    """Check mesh, interface and the fields of all states.  Returns the states as `StateNumbers`."""
     files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)

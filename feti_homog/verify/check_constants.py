@@ -116,7 +116,7 @@ def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Compute constants by name from the stiffness C (3, 3) or (6, 6) and the thermal stress `heat` (6,).
+    """Compute constants by name from the stiffness C (3, 3) or (6, 6) and the thermal stress `heat` (6,) or None.
 
     Strains eps under a unit stress along x_i give E_i = 1 / eps_i, nu_ij = -eps_j / eps_i, eta_i = gamma_12 / eps_i.
     """

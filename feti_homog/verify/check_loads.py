@@ -88,7 +88,7 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state with cohesive tractions but without large `FIELDS`, which one state at a time has in memory.
+    """A state with cohesive tractions, and with empty arrays as large `FIELDS`, so that all states fit in memory.
 
     Attributes:
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.
@@ -164,7 +164,7 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check prescribed strains, stresses and temperature, relative to `scales` of strain and stress."""
+    """Check prescribed strains and stresses relative to `scales`, and the temperature T relative to max(|T|, 1)."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
     values, by_stress = load.values[:v], load.by_stress[:v]
     findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")

@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Mark the nodes (k,) inside an arc, and outside all.  `opening` is the default angle of arcs in degrees."""
+    """Mark nodes (k,) inside an arc, and outside all, none at tips; arcs open by `opening` degrees by default."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
@@ -217,7 +217,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Compare element errors with a second estimate, and the energy error with their sum."""
+    """Compare the energy error with the sum of element errors and, under unit loads, the sum with a second estimate."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

@@ -47,13 +47,13 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """Sum values (b, c) over the copies on one face: (k, c)."""
+        """Sum values (b, c) over the copies on the matrix face, or the face `of_fibre`: (k, c)."""
         on_face = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
         return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """Average values (b, c) over the subdomains on one face: (k, c), NaN without a subdomain."""
+        """Average values (b, c) over the subdomains on a face, as in `sums`: (k, c), NaN without a subdomain."""
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)

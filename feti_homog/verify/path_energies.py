@@ -47,10 +47,10 @@ class PointNumbers:
 
     @classmethod
     def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
-        """Collect the numbers of a point, from its `state` if there is one.
+        """Collect the numbers of a point, from its `state` if there is one, else from result.json.
 
-        Without a state, the stored energy is E.Sigma / 2 by Hill's lemma (8); the conjugate of a temperature follows
-        from the stored energy in the file.
+        Without a state at temperature 0, Hill's lemma (8) gives the stored energy E.Sigma / 2, and the conjugate is NaN
+        if there are expansions; at other temperatures, it follows from the stored energy in the file.
         """
         point, n = cell.files.document["path"][number], len(load.values)
         strain, stress, name = np.array(point["strain"]), np.array(point["stress"]), f"path[{number}]"

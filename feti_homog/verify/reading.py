@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Context manager: open the results in a folder.  Raises CaseError, of one line, for an unreadable file."""
+    """Context manager: open the results in a folder.  Raises CaseError; OSError, KeyError for a fault in result.h5."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {

@@ -1,7 +1,7 @@
 """Evaluate cohesive laws t(delta) of the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
-K is the stiffness of a mode, with opening delta_n, slip delta_s: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t
-delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
+K is the stiffness of a mode psi, 0 (opening delta_n) to pi/2 (slip delta_s): K (delta_n^2 + delta_s^2) = k_n delta_n^2
++ k_t delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
 """
 
 from abc import abstractmethod

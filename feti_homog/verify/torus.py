@@ -112,7 +112,7 @@ def same_places(points: Float, shift: Float | None, radius: float) -> Int:
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
     """Return whether two bodies meet along one line at places (places,).
 
-    `part` (m,) is the body of an element.  There each body ends at two sides, not all alone; middle nodes always fit.
+    `part` (m,) is the body of an element.  There four ends of sides meet, not all `alone`; middle nodes always fit.
     """
     apart = ~sides.alone & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)

@@ -1,12 +1,12 @@
 """The adaptive coarse space: rigid-body motions and soft subdomain modes, averaged over node copies.
 
-After elimination of the coarse displacements Z_0 (`geneo.AveragedModes`), the boundary stiffness S becomes
+Eliminating the coarse displacements Z_0 (`geneo.AveragedModes`) turns the boundary stiffness S, with springs, into
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-and the preconditioner is H_0 = B_D S_0 B_D^T, B_D = W^-1 B D^-1.  As B Z_0 = 0, H_0 is the inverse of the dual operator
-if Z_0 spans all displacements of the glued cell (T9).  If Z_0 spans the soft modes, H_0 removes them from the Krylov
-method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is positive semi-definite; it couples a subdomain's neighbours.
+and the preconditioner is H_0 = B_D S_0 B_D^T, B_D = W^-1 B D^-1 (`preconditioners`).  As B Z_0 = 0, H_0 inverts the
+dual operator if Z_0 spans all displacements of the glued cell (T9), and removes the soft modes that Z_0 spans from the
+Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is semi-definite; it couples a subdomain's neighbours.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """Compute S Z_0 and Z_0^T S Z_0 on subdomains `which`; `BW` are their scaled constraints."""
+        """Store S Z_0 and Z_0^T S Z_0 of the local subdomains `which`; `BW` are their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)

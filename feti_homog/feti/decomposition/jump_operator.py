@@ -101,11 +101,11 @@ class JumpOperator:
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """Gather the local rows of x (owned rows,) or (owned rows, k); may return x itself.  Collective."""
+        """Gather local rows from x (owned rows,) or (owned rows, k); return x itself if layouts agree.  Collective."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """Sum x (local rows,) or (local rows, k) over ranks; return the owned rows, or x itself.  Collective."""
+        """Sum x (local rows,) or (local rows, k) to owned rows; return x itself if layouts agree.  Collective."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:

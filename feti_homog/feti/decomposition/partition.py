@@ -37,8 +37,8 @@ def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two connected strips for two ranks.
 
     The strips run along x or y, with about half the triangles each (within STRIP_SLACK), and with the fewest boundary
-    edges of the cuts tried; METIS cuts are up to 50 % longer.  Islands of a strip join the other strip.  Returns None
-    if a strip is still not connected.
+    edges among all candidates; METIS cuts are up to 50 % longer.  Islands of a strip join the other strip.  Returns
+    None if a strip is still not connected.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -121,7 +121,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for about `max_dofs` dofs per piece at most."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles; pieces have about `max_dofs` dofs or fewer."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -132,7 +132,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into `count` parts (n,) of about equal `load` (n,) or, if None, connected if possible."""
+    """Divide a graph by METIS into `count` parts (n,), of about equal `load` (n,) or else connected if possible."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

@@ -190,11 +190,11 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) on the diagonal of K.
+        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K where it scales jumps.
 
-        The factor reduces the stiffness that scales jumps: boundary motions that keep the volume are as stiff as mu;
-        single nodes of mixed elements are as stiff as lambda.  The factor is 1 without mixed elements, and for several
-        materials, all far from incompressible.  lambda and mu are the Lame constants of L.
+        Single nodes of mixed elements are as stiff as lambda, boundary motions at constant volume only as mu.  The
+        factor is 1 without mixed elements, and for several materials, which are all far from incompressible.  lambda
+        and mu are the Lame constants of L.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -255,7 +255,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2) that leave nodes `held` at rest."""
+    """Compute orthonormal translations and, if it `rotates`, the turn (cn, k) of a body that leave `held` at rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:

@@ -84,7 +84,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state; return False if `FollowedResponse.follow` fails.  Collective."""
+        """Update followed columns to the next state.  Collective; returns False like `FollowedResponse.follow`."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -188,7 +188,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def rounding(self) -> float:
-        """Compute the relative rounding error of the reference cell's H.  Collective.
+        """The relative rounding error of the reference cell's H.  Collective when first read for a reference cell.
 
         Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
@@ -215,7 +215,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
-        positions.  Returns None, and restarts old columns, if their number of free motions differs from `free`.
+        positions.  Returns None if the number of pins is not `free`, after `_restart` unless the reference cell is new.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -227,10 +227,10 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute the answer U (owned rows, v) anew, by the response of the reference cell to `d`.  Collective.
+        """Store and return the answer U (owned rows, v) by the response of the reference cell to `d`.  Collective.
 
         `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
-        rounding from earlier updates, and replaces the stored U.
+        rounding from earlier updates.
         """
         changes = self._up_to_date()
         if self._answer is None:

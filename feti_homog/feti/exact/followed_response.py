@@ -109,7 +109,7 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
+        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2), which count as used.  Collective.
 
         Both rows of a pair belong to one rank.  Raises ValueError if a row has no column.
         """
@@ -216,7 +216,7 @@ class FollowedResponse:
         return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
-        """Return columns (owned rows, k) of Gamma at global rows (k,), and rows of [columns, U].  Collective.
+        """Begin a change: return columns (owned rows, k) of Gamma at `rows`, and rows of [columns, U].  Collective.
 
         The second array (k + all columns, k + v), equal on all ranks, has rows `rows`, then all rows with a column.
         """
@@ -227,7 +227,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B [Gamma_I:, U_I] from columns (later) and U (now); `values` come from `_present`."""
+        """Subtract `difference` B U_I from U, and keep `difference` B Gamma_I: waiting; `values` as from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B

@@ -63,8 +63,8 @@ class ReferenceChanges:
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
         """Compute the largest asymmetry of new columns against followed columns.  Collective.
 
-        Gamma' is symmetric.  The error is relative to the largest entry; `stiffness` (all rows,) makes all entries
-        dimensionless.  The new `columns` (owned rows, k) belong to global `rows` (k,) outside C.
+        Gamma' is symmetric.  The error is relative to the largest entry, at least 1; `stiffness` (all rows,) makes all
+        entries dimensionless.  The new `columns` (owned rows, k) belong to global `rows` (k,) outside C.
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
         active = distributed_arrays.gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0

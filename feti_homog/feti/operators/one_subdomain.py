@@ -86,7 +86,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by a symmetric matrix: `diagonal` (n,), and the lower or upper triangle of the array.
+        """Multiply x by a symmetric matrix, `diagonal` (n,) and a triangle (`lower` 0 or 1), into `out` if given.
 
         A product is fastest for x in Fortran order.
         """
@@ -103,7 +103,7 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """Extend boundary displacements x (n, k) under loads (v, k) to (all dofs, k), by the kept factor."""
+        """Extend displacements x (n, k), under loads (v, k) unless None, to (all dofs, k) by the kept factor."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:
@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T, or K_ii if the subdomain is pinned and has no boundary; `dofs` (n,) are ascending.
+        """Factor K + rho Rf Rf^T (`fixing`), or K_ii if pinned and without boundary; `dofs` (n,) are ascending.
 
         Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
         """

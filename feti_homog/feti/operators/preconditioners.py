@@ -159,7 +159,7 @@ class SpringUpdate:
 
 
 def _factored(block: Float) -> tuple[Float, bool]:
-    """Factor C^-1 + X^T H X; raise ConvergenceError if it is not definite."""
+    """Return the Cholesky factor of C^-1 + X^T H X, for `cho_solve`.  Raises ConvergenceError if it is not definite."""
     try:
         factor: tuple[Float, bool] = cho_factor(block)
     except LinAlgError as error:

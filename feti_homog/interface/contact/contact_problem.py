@@ -38,7 +38,7 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """The contact problem of all interfaces; this rank owns k interface nodes.
+    """The contact problem of all interfaces, k nodes on this rank; solves and `undetermined` set the state of `solver`.
 
     Attributes:
         solver: dual solver.

@@ -138,8 +138,8 @@ class FloatingBodies:
 
             (1 - w) before + w after + M a >= 0,   for the second fraction   >= -2 noise.
 
-        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt; if it never
-        is, both are 1.  Collective, decided on rank 0; raises like `place`.
+        At the first fraction, faces begin to squeeze a fibre; at the second, the squeezing is beyond doubt.  If no
+        fibre is squeezed beyond doubt, both are 1.  Collective, decided on rank 0; raises like `place`.
         """
         return self._on_root(_Fibres.shares, before, after)
 

@@ -78,10 +78,10 @@ class StatusSearch:
         return result is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int | None = None) -> tuple[Found, bool]:
-        """Correct wrong statuses by at most `solves` pivots; by default SOLVES and one for each status of each node.
+        """Correct wrong statuses by pivots: return the statuses with x, and whether the forces balance.
 
-        Return the statuses and x, or None without an end, and whether the forces balance.  After some block pivots
-        without progress, one random node changes at a time: a fixed order may end in a cycle.
+        Returns (None, False) after `solves` pivots, by default SOLVES + 4 n.  After some block pivots without progress,
+        one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves or SOLVES + self.allowed.size):
@@ -195,15 +195,14 @@ class CoulombFaces(FaceSystem):
         return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
 
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Find the statuses (n,) and x (m,) at the end of an implicit step to a load.
+        """Find the statuses (n,) and x (m,) at the end of an implicit step to a load; arguments as in `search`.
 
-        Raises NotCarriedError and StuckError as `search` does; StuckError also if all results have negative
-        determinants.
+        Raises as `search` does, and StuckError if all results have negative determinants.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 
     def carries(self, status: Status, load: Prescribed, start: Float) -> bool:
-        """Return whether an implicit step to `load` has admissible statuses; a few pivots decide most cases."""
+        """Return whether `step` would find admissible statuses, of any determinant; a few pivots decide most cases."""
         search = StatusSearch(self, self.all_allowed(), load, start)
         result = search.by_pivots(self._known(status), SOLVES)
         if result is not None or search.slides_freely(self._known(status)):

@@ -83,7 +83,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Describe breaks under tractions (p, c) by d values (p, d), with the first d names in `break_names`."""
+        """Return the mode of breaks (p, d) under tractions (p, c): shares of strengths, or mode angles in degrees."""
 
     @classmethod
     @abstractmethod

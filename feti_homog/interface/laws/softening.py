@@ -3,7 +3,8 @@
 Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
 Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
 
-W is the energy that undamaged springs would store at the same opening and slip, B the fraction of W in shear:
+W is the energy that undamaged springs k_n, k_t would store at the same opening and slip, B the fraction of W in shear;
+strengths N, S, toughnesses G_n, G_t (opening, slip) and eta are constants:
 
     W_0 = 1 / ((1 - B) / W_n + B / W_t),  W_n = N^2 / (2 k_n),  W_t = S^2 / (2 k_t)     onset of damage,
     G_c = G_n + (G_t - G_n) B^eta                                                       energy of the law,

@@ -83,13 +83,13 @@ class CoulombLeg(Leg):
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the current statuses, x and macroscopic state.  Add the energies since the last state."""
+        """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, after its break, if any.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
@@ -109,7 +109,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to new statuses and scaled x.  Energy losses are per area."""
+        """Advance on a straight path to new statuses and scaled x; add the work and the losses, energies per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the next leg fraction, and the error that limits it; None for all of `share`, even if stuck."""
+            """Return the next leg fraction, and the error that limits it; (`share`, None) also if no statuses fit."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -21,9 +21,9 @@ SAME_SHARE = 1e-9
 class Leg(ABC):
     """Leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
-    The loads at s = 0 and s = 1 prescribe the same components as strains and as stresses.  Bonds break at constant
-    load: the state before a break is a point, and the path continues from the state after the break at the same s.
-    Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
+    The loads `start` at s = 0 and `end` at s = 1 prescribe the same components as strains and as stresses.  Bonds break
+    at constant load: the state before a break is a point, and the path continues from the state after the break at the
+    same s. Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
 
     Attributes:
         limit: error that stopped the last step short of its load, or None.
@@ -62,7 +62,7 @@ class Leg(ABC):
         """Advance to fraction `share` of the leg in one step, with fixed bonds.  Collective."""
 
     def points(self) -> Iterator[path_points.Point]:
-        """Yield the leg's points, up to a solve without convergence.  Collective."""
+        """Yield the points of the leg, its end as the last point.  Collective."""
         yield from self._break_overloaded()
         while not self._is_over():
             yield from self._advance()
@@ -109,7 +109,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Yield a point and break the worst bonds, until none is overloaded.  Collective; `is_due`: at least once."""
+        """Yield a point and break the worst bonds until none is overloaded, at least once if `is_due`.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)

@@ -27,7 +27,7 @@ class PathState:
         last: state at the last point.
         broken: fracture energy per cell area of the bonds that broke at the last point, with a toughness for the mode
             of each break; 0 without toughness, None without a break.
-        stretched: with friction, energy per area in the springs of damaged bonds, before this break.
+        stretched: with friction, energy per area in the springs of damaged bonds, before the break at the last point.
     """
 
     leg: int

@@ -79,7 +79,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Mark pixels (rows, columns) an odd number of outlines off the matrix; MeshError if three phases touch."""
+    """Mark pixels (rows, columns) of the phases 1, 3, ... contacts from the matrix; MeshError if three phases touch."""
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
     a, b = a[a != b], b[a != b]

@@ -106,7 +106,7 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Return the number of additional triangles around a tip.
+    """Return the number of additional triangles around a tip, where `ratio` = size far from the tip / size at the tip.
 
     With the size h at the tip, the growth g and A = TRIANGLE_AREA, the number is int 2 pi r dr / (A (h + g r)^2) up to
     the radius r where h + g r = ratio h, less the number of triangles of size ratio h in this circle.
@@ -116,6 +116,6 @@ def triangles_of_a_tip(ratio: np.float64 | float) -> float:
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Return the size ratio at a tip with `count` additional triangles, at most RATIOS[-1]."""
+    """Invert `triangles_of_a_tip`: return the size ratio for `count` triangles, from 1 to RATIOS[-1]."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

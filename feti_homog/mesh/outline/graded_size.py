@@ -97,7 +97,7 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes in a case, relative to the cell width."""
+        """Return the sizes in a case, relative to the cell width; `tip` is `interface` unless the cell `has_tips`."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 

@@ -77,7 +77,7 @@ class KeywordBlock:
         For example, *ELEMENT, TYPE=CPE3 has the keyword ELEMENT and the parameter TYPE.
 
         Raises:
-            MeshError: the keyword is unknown, or a parameter of a mesh keyword is not read.
+            MeshError: the keyword is unknown or refused, or a mesh keyword has a parameter that is not in READ.
         """
         word, *rest = (part.strip() for part in line[1:].split(","))
         try:
@@ -104,10 +104,10 @@ class KeywordBlock:
 
 
 def blocks(text: str) -> Iterator[KeywordBlock]:
-    """Yield the keyword blocks of a file.
+    """Yield the keyword blocks of the `text` of a file.
 
     Raises:
-        MeshError: a keyword is unknown, its parameter is not read, or data precede the first keyword.
+        MeshError: as in `KeywordBlock.begun`, or data precede the first keyword.
     """
     block, open_line = None, ""
     for number, line in enumerate(map(str.strip, text.splitlines()), start=1):

@@ -51,7 +51,7 @@ class ConvexSums(ConvexCurves):
         return self.support(axes).reshape(-1, 2, 2)
 
     def grown(self, thickness: Float) -> ConvexSums:
-        """Enlarge the outlines by rings of thickness (k,)."""
+        """Return the outlines enlarged by rings of thickness (k,)."""
         frames, some = self.frames.copy(), thickness > 0
         is_sharp = some & ~frames.any(axis=(1, 2))
         frames[is_sharp] = thickness[is_sharp, None, None] * np.eye(2)

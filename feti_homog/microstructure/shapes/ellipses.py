@@ -56,7 +56,7 @@ class Ellipses(ConvexCurves):
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Lengthen both semi-axes, the columns of F, by `thickness` (k,)."""
+        """Return the ellipses with both semi-axes, the columns of F, longer by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -225,7 +225,7 @@ class Discs(ConvexCurves):
         return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
 
     def grown(self, thickness: Float) -> Discs:
-        """Enlarge the outlines by rings of thickness (k,)."""
+        """Return the discs enlarged by rings of thickness (k,)."""
         return replace(self, radii=self.radii + thickness)
 
     def points(self, angle: Float) -> Float:

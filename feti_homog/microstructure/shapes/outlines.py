@@ -39,23 +39,23 @@ class ConvexCurves:
         return self._each(lambda array: array[rows])
 
     def at(self, centres: Float) -> Self:
-        """Move the curves to other centres (k, 2)."""
+        """Return the curves at other centres (k, 2)."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Self:
-        """Divide all lengths and centres by a length unit."""
+        """Return the curves with all lengths and centres divided by a length unit."""
         return self._each(lambda array: array / unit)
 
     def scaled(self, factor: float) -> Self:
-        """Multiply all lengths and centres by a factor."""
+        """Return the curves with all lengths and centres multiplied by a factor."""
         return self._each(lambda array: factor * array)
 
     def rounded(self, decimals: int) -> Self:
-        """Round all coordinates to a number of decimals."""
+        """Return the curves with all coordinates rounded to a number of decimals."""
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Append other outlines; all cores have one number of corners."""
+        """Return the curves followed by other curves; all cores have one number of corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:

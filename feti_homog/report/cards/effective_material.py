@@ -76,8 +76,7 @@ class EffectiveMaterial:
     def constants(self) -> dict[str, float]:
         """Return the engineering constants by name, in the order of an Abaqus card.
 
-        With the compliance S: E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i), G_ij = 1/(shear
-        entry).
+        With the compliance S: E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i), G_ij = 1/S_kk.
         """
         S = self.compliance
         return {
@@ -146,7 +145,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
 def _material(
     document: Document, symmetry: str, compliance: Float, expansion: Float | None, errors: Mapping[str, float]
 ) -> EffectiveMaterial:
-    """Return a material with the name, version and unit of a result."""
+    """Return a material with the name, version and unit of a result; the expansion may be None."""
     case, unit = document["case"], document["case"]["output"]["stress_unit"]
     return EffectiveMaterial(case["name"], document["version"], unit, symmetry, compliance, expansion, errors)
 
@@ -228,7 +227,7 @@ def identifier(name: str) -> str:
 def conductor_card(document: Document, form: str, symmetry: str) -> str:
     """Return the card of a conductivity as computed, or of the nearest "transversely isotropic" conductivity.
 
-    Couplings are left out: of the nearest conductivity all, as computed up to `NEGLIGIBLE` sqrt(k_ii k_jj).
+    A card has no couplings k_ij: as computed, they must be at most `NEGLIGIBLE` sqrt(k_ii k_jj).
 
     Raises:
         CaseError: the result did not converge, has larger couplings, or the format has no conductivity.

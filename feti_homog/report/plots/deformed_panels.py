@@ -73,7 +73,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell in a state, with its nodes at `moved` (p, 2).
+        """Draw the cell in state `number`, with its nodes at `moved` (p, 2).
 
         Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
         """

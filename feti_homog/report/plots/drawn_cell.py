@@ -68,9 +68,9 @@ class InterfaceEdges:
         return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
-        """Draw the interface edges in a state, with nodes at `points` (p, 2).
+        """Draw the interface edges in a state, with nodes at `points` (p, 2) and `magnified` widths.
 
-        Returns legend lines for the drawn states.  Damaged edges have the colour of the damage at their ends, in
+        Returns legend lines for the drawn states.  The colour of damaged edges shows the damage at their ends in
         tenths.
         """
         states = self.state(states_of_nodes(state))

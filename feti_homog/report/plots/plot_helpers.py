@@ -188,8 +188,8 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
     """Choose the colour range of a field.
 
-    At most 0.5 % of the area lies beyond either end, in each state of values (states, n).  A field uniform to 1 % has
-    one colour.  Returns the range, and the ends beyond which values lie: "min", "max", "both" or "neither".
+    At most 0.5 % of `areas` (None: equal areas) lies beyond either end, in each state of values (states, n).  A field
+    uniform to 1 % has one colour.  Returns the range, and the ends with values beyond: "min", "max", "both", "neither".
     """
     low, high = float(values.min()), float(values.max())
     if high - low <= 0.01 * max(abs(low), abs(high), 1e-300):

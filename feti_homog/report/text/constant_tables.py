@@ -131,7 +131,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of constants between their bounds, or a title alone.  It marks values beyond Reuss and Voigt."""
+    """Return a table of constants between bounds, or only a title without bounds; marks Reuss-Voigt violations."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -184,7 +184,7 @@ def cell_constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the kind of cells that have estimates, which this cell lacks."""
+    """Name the composites to which the estimates apply, after the property of this cell that excludes it."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"

@@ -259,6 +259,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return a value without noise, and its position in words.  The position is "-" for the value zero."""
+    """Return the k-th value of a quantity without noise, and its position "x, y"; "-" for the value zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"

@@ -44,7 +44,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 
 
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Call a function on every rank; if a rank raises an exception, every rank raises.  Collective.
+    """Call a function on every rank, and return its result; if a rank raises, every rank raises.  Collective.
 
     `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
     A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
@@ -102,7 +102,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print the exception of this rank, and end the processes of all ranks."""
+    """Print the exception of this rank, and abort the processes of all ranks with its exit code; never returns."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
