@@ -4,7 +4,11 @@ Two classes with the same name, `implementation`, implement a law: runs use the 
 results use the class in `verify`, with its own formulas.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.schema import wording
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,16 @@ class BondLawEntry:
     limits: tuple[str, ...] = ()
     softens: bool = False
     has_process_zone: bool = False
+
+    def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
+        """Word the fault of a required key that a table lacks, with a value that the user may choose."""
+        words = f": missing; law = {wording.toml_value(self.name)} needs it"
+        if (normal := name.replace("tangential", "normal")) != name:
+            return f"{words}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
+        stiffness = (
+            "50 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
+        )
+        return f"{words}, such as {stiffness}" if name == STIFFNESSES[0] else words
 
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
