@@ -221,12 +221,10 @@ class AnalysisContext:
         """Return the means, energies and debonding of a point under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
-        energies = {
-            "stored": sum(response.stored for response in responses),
-            "stored_in_springs": sum(response.in_springs for response in responses),
-        }
-        iterations = sum(response.state.iterations for response in responses)
-        return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
+        stored, in_springs = (sum(getattr(r, name) for r in responses) for name in ("stored", "in_springs"))
+        energies = {"stored": stored, "stored_in_springs": in_springs}
+        iterations = {"iterations": sum(r.state.iterations for r in responses)}
+        return self.loads.means(responses) | energies | self.point(responses[:1]) | iterations
 
     def remarks(self) -> list[str]:
         """Return the notes, and remarks on undetermined and absurd strains."""

@@ -11,7 +11,7 @@ from feti_homog.case import cases, cell_section
 from feti_homog.errors import CaseError
 from feti_homog.mesh import Torus, arrange, mesh_fibres
 from feti_homog.mesh.fill import gmsh_mesher, pixel_mesher
-from feti_homog.microstructure import periodic_table
+from feti_homog.microstructure import periodic_table, phase_names
 from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
 
@@ -19,8 +19,8 @@ from feti_homog.typing import Float
 def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
-    The table has a row for each fibre and void, ordered by fibre number.  Ellipses have the columns `a`, `b` and
-    `angle`, coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
+    The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
+    coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
 
     Raises:
         CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is neither disc nor ellipse.
@@ -30,7 +30,8 @@ def table(source: Path) -> str:
         raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
     ellipses, is_round = fibres.ellipses, fibres.ellipses.are_round
     a, b = ellipses.semi_axes.T
-    columns = dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
+    columns = {"number": ["" if phase == phase_names.VOID else str(k) for k, phase in enumerate(fibres.phases, 1)]}
+    columns |= dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
     columns["radius"] = _words(np.where(is_round, a, np.nan))
     columns["phase"] = list(fibres.phases)
     if not is_round.all():
@@ -44,10 +45,9 @@ def table(source: Path) -> str:
     if fibres.cores.any():
         columns["inner_radius"] = _words(fibres.cores)
     rows = map(",".join, zip(*columns.values(), strict=True))
-    width, height = fibres.size.tolist()
     reach = fibres.ellipses.longest[:, None]
     low, high = (ellipses.centres + reach).min(axis=0), (ellipses.centres - reach).max(axis=0) - fibres.size
-    left, bottom = np.clip(fibres.origin, high, low).tolist()
+    (width, height), (left, bottom) = fibres.size.tolist(), np.clip(fibres.origin, high, low).tolist()
     size = f"# width = {width!r}, height = {height!r}, left = {left!r}, bottom = {bottom!r}"
     return "\n".join([size, ",".join(columns), *rows])
 
@@ -147,6 +147,6 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     ellipses = Ellipses(centres, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
-    columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}
-    others = shapes.columns_without_tips(columns) if columns else {}
+    columns = {} if cell.table is None else cell.table.columns
+    others = shapes.columns_without_tips({name: of[arrangement.row] for name, of in columns.items()}) if columns else {}
     return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, others)
