@@ -35,7 +35,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
             cell, subdomains = case.cell, [count for count, _ in loads]
             nodes = [coarse_triangles * lattice.intervals**2 // 2 for _, coarse_triangles in loads]
             elements = summary.coarse_triangles * len(lattice.triangles)
-            unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
+            unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge, summary.radii)
             sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
             lines = [
                 f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
@@ -114,7 +114,7 @@ def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[
             chosen = "all" if isinstance(arc.fibre, str) else ", ".join(str(records[k - 1]) for k in arc.fibre)
             yield f"arc        [{label}] debonded[{number}]: {angle} about {arc.centre:g} degrees, fibre {chosen}"
     if case.cell.mix is not None:
-        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii
         mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
         yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
     if case.cell.match is not None:

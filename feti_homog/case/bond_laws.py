@@ -24,7 +24,6 @@ class BondLawEntry:
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows before a bond breaks.
-        has_process_zone: whether elements must resolve the length along which bonds break.
     """
 
     name: str
@@ -35,7 +34,6 @@ class BondLawEntry:
     needs: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     softens: bool = False
-    has_process_zone: bool = False
 
     def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
         """Word the fault of a required key that a table lacks, with a value that the user may choose."""
@@ -71,7 +69,6 @@ REGISTRY = (
         "the energy of the bond's spring / G_c, see toughness",
         ((r"G_\mathrm{Ic}", "toughness", False),),
         needs=STIFFNESSES,
-        has_process_zone=True,
     ),
     *(
         BondLawEntry(
@@ -82,7 +79,6 @@ REGISTRY = (
             ((r"N", "normal_strength", True), (r"S", "tangential_strength", True)),
             needs=needs,
             softens=True,
-            has_process_zone=True,
         )
         for name, description, needs in (
             ("bilinear", "linear softening", (*STIFFNESSES, *COHESIVE)),
