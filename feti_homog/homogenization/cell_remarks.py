@@ -18,7 +18,6 @@ SAME_RATIO = 0.01
 RESOLVED = 0.5
 # The same ratio for cohesive laws, whose tractions fall along the process zone.
 RESOLVED_SOFTENING = 1 / 3
-UNLIKELY = 100.0  # ratio of process zone to fibre radius, or its inverse, beyond which units are in doubt
 LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on interfaces / cell width
 
 
@@ -97,13 +96,15 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on cell sides, linear elements, teeth of `bonds` bonds (0: unknown), and the fibre fraction."""
+    """List remarks on sides, linear elements, scatter, teeth of `bonds` bonds (0: unknown), and the fibre fraction."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
         return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
     if case.analysis.type == "envelope" and cell.order == 1:
         lines = ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
+    if cell.geometry == "random" and case.output.mesh_error:
+        lines += (f'[cell] seed = {cell.seed}: "+-" has mesh errors, no scatter, as realisations in [sweep] have',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
@@ -177,7 +178,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
         return lines
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
     ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
-    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 1 / UNLIKELY <= ratio <= UNLIKELY
+    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # units
     zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" * doubt
     if edge / 2**case.cell.refine <= resolved * length:
         return [f"{law}: the process zone is {zone}"] * doubt + lines

@@ -25,7 +25,7 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     del content["sweep"]
     if fraction is not None:
         content["cell"]["fibre_fraction"] = fraction
-    found = case_remarks(Case.parse(content, ROOT / "drivers"))
+    found = [line for line in case_remarks(Case.parse(content, ROOT / "drivers")) if "fibre_fraction" in line]
     assert len(found) == (fraction is not None)
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
 
@@ -43,6 +43,14 @@ def test_onsets_by_linear_elements_have_a_remark(order):
     content |= {"envelope": {"plane": ["S11", "S22"]}, "analysis": {"type": "envelope", "plane": "strain"}}
     content["cell"]["order"] = order
     assert ["onsets err more" in line for line in case_remarks(Case.parse(content))] == [True] * (order == 1)
+
+
+def test_one_arrangement_has_no_scatter_in_its_errors():
+    content = tomllib.loads(VALID_CASES["base"])
+    random = content | {"cell": {"geometry": "random", "fibres": 5, "fibre_fraction": 0.4, "seed": 7}}
+    (line,) = case_remarks(Case.parse(random))
+    assert line.startswith('[cell] seed = 7: "+-" has mesh errors, no scatter')
+    assert not case_remarks(Case.parse(random | {"output": {"mesh_error": False}})) + case_remarks(Case.parse(content))
 
 
 @pytest.mark.parametrize("key", [{"teeth": 3}, {"softening_tolerance": 0.15}, {}], ids=str)
