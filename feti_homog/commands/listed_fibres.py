@@ -30,8 +30,7 @@ def table(source: Path) -> str:
         raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
     ellipses, is_round = fibres.ellipses, fibres.ellipses.are_round
     a, b = ellipses.semi_axes.T
-    columns = {"number": ["" if phase == phase_names.VOID else str(k) for k, phase in enumerate(fibres.phases, 1)]}
-    columns |= dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
+    columns = dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
     columns["radius"] = _words(np.where(is_round, a, np.nan))
     columns["phase"] = list(fibres.phases)
     if not is_round.all():
@@ -44,6 +43,7 @@ def table(source: Path) -> str:
         columns[name] = [new or old for old, new in zip(before, _words(values), strict=True)]
     if fibres.cores.any():
         columns["inner_radius"] = _words(fibres.cores)
+    columns["number"] = ["" if name == phase_names.VOID else str(k) for k, name in enumerate(fibres.phases, 1)]
     rows = map(",".join, zip(*columns.values(), strict=True))
     reach = fibres.ellipses.longest[:, None]
     low, high = (ellipses.centres + reach).min(axis=0), (ellipses.centres - reach).max(axis=0) - fibres.size
