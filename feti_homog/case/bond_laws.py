@@ -41,7 +41,7 @@ class BondLawEntry:
         if (normal := name.replace("tangential", "normal")) != name:
             return f"{words}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
         stiffness = (
-            "50 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
+            "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
         )
         return f"{words}, such as {stiffness}" if name == STIFFNESSES[0] else words
 

@@ -157,7 +157,7 @@ FAULTY_COHESIVE_LAWS: dict[str, str] = {
     '[interface] normal_toughness: missing; law = "bilinear" needs it\n'
     '[interface] tangential_toughness: missing; law = "bilinear" needs it':
         of_type("path", PATH, "[interface]", *SOFTENING[1:3], 'law = "bilinear"', "normal_strength = 1.0"),
-    '[interface] normal_stiffness: missing; law = "bilinear" needs it, such as 50 E / r, E of the matrix, r of\n'
+    '[interface] normal_stiffness: missing; law = "bilinear" needs it, such as 100 E / r, E of the matrix, r of\n'
     '[interface] tangential_stiffness: missing; law = "bilinear" needs it, such as normal_stiffness':
         of_type("path", PATH, "[interface]", *SOFTENING[:1], *SOFTENING[3:], "normal_toughness = 1.0"),
     '[interface] toughness = 2.0: belongs to law = "energy", not "max"; use normal_ and tangential_toughness: ':
