@@ -96,10 +96,10 @@ def read(source: Path) -> ListedFibres:
     """
     fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
     sizes = np.column_stack([fibres.ellipses.centres, fibres.radii, fibres.coatings])
-    lost = np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1
-    if len(lost):
-        listed = ", ".join(map(str, lost[:10]))
-        raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {listed}")
+    lost = [*map(str, np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1)]
+    if lost:
+        line = f"{source}: fibres that are neither round nor ellipses have no radius: {', '.join(lost[:10])}"
+        raise CaseError(f"{line}; `feti-homog check` prints the centres of debonded ones")
     return fibres
 
 
