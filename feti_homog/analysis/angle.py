@@ -26,7 +26,6 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     for number, value in enumerate(section.values):
         bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
-        responses: list[averaging.Response]
         if unit:
             columns, responses = context.unit_responses(f"{label} ", bonds, starts, 1.0)
             errors, responses = unit_errors(context, responses)

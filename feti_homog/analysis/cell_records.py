@@ -14,7 +14,8 @@ from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization import unit_cell
+    from feti_homog.case import Case
+    from feti_homog.homogenization import domain_partition, unit_cell
 
 
 @dataclass(frozen=True)
@@ -64,14 +65,26 @@ class FibreInfo:
         "strength of its bonds / strength in [interface]; absent if all fibres have the same strength", default=None
     )
 
+    def __str__(self) -> str:
+        place = "around the cell" if self.centre is None else "centre ({:.6g}, {:.6g})".format(*self.centre)
+        return f"{self.number} ({self.phase}{f', row {self.row}' if self.row else ''}, {place})"
+
     @classmethod
-    def all_of(cls, cell: unit_cell.TornCell) -> tuple[FibreInfo, ...]:
-        """Return the records of the fibres, in the order of their numbers."""
-        summary, factors = cell.summary, cell.strength_factors
+    def all_of(cls, case: Case, summary: domain_partition.CellSummary, factors: Float) -> tuple[FibreInfo, ...]:
+        """Return the records of the fibres, in the order of their numbers.
+
+        `factors` (fibres,) are strength factors; centres are in the user's coordinates.
+        """
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
         is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
-        columns = bodies, summary.coatings, factors, *_listed(cell)
+        centres, table, rows = summary.centres[bodies] + summary.origin, case.cell.table, [None] * summary.fibres
+        if table is not None:
+            from feti_homog.microstructure import periodic_table  # imports the windows of tables
+
+            rows = table.row[periodic_table.fibre_rows(table, case.cell.window)].tolist()
+            centres = periodic_table.listed_centres(table, case.cell.window, centres)
+        columns = bodies, summary.coatings, factors, centres, rows
         return tuple(
             cls(
                 number=number,
@@ -86,18 +99,6 @@ class FibreInfo:
             )
             for number, (body, thickness, factor, centre, row) in enumerate(zip(*columns, strict=True), 1)
         )
-
-
-def _listed(cell: unit_cell.TornCell) -> tuple[Float, list[int | None]]:
-    """Return fibre centres (fibres, 2) in the user's coordinates, and table rows, None without a table."""
-    summary, table, window = cell.summary, cell.case.cell.table, cell.case.cell.window
-    centres = summary.centres[summary.fibre_bodies] + summary.origin
-    if table is None:
-        return centres, [None] * summary.fibres
-    from feti_homog.microstructure import periodic_table  # imports the windows of tables
-
-    rows = table.row[periodic_table.fibre_rows(table, window)].tolist()
-    return periodic_table.listed_centres(table, window, centres), rows
 
 
 @dataclass(frozen=True)

@@ -250,4 +250,5 @@ class AnalysisContext:
     def warnings(self) -> list[str]:
         """Return the warnings about settings that are probably unintended."""
         summary = self.cell.summary
-        return [*cell_remarks.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]
+        zones = cell_remarks.warnings(self.case, summary.width, summary.interface_edge, summary.radii)
+        return [*zones, *self.checks.warnings()]

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import Case
+from feti_homog.analysis.cell_records import FibreInfo
+from feti_homog.case import Case, interface_section
 from feti_homog.errors import CaseError
 from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition import shared_entities
@@ -28,12 +29,13 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
         c = phase_laws.problems(case)[0].components
         options, summary, multipliers = solver_plan.database_options(), part.summary, c * constraints
+        pieces = f"{summary.subdomains} subdomain{'s' * (summary.subdomains > 1)}"
 
         def described() -> str:
             cell, subdomains = case.cell, [count for count, _ in loads]
             nodes = [coarse_triangles * lattice.intervals**2 // 2 for _, coarse_triangles in loads]
             elements = summary.coarse_triangles * len(lattice.triangles)
-            unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
+            unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge, summary.radii)
             sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
             lines = [
                 f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
@@ -43,7 +45,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
                 f"elements of order {cell.order}, about {c * sum(nodes)} degrees of freedom",
                 *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
                 *_fibre_lines(case, summary),
-                f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
+                f"tearing    {summary.bodies} bodies, {pieces}, {multipliers} multipliers",
                 *_cost_lines(case, summary, multipliers, options, subdomains, nodes),
                 *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
                 *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
@@ -52,10 +54,6 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
             return "\n".join(lines)
 
         return mpi_errors.on_root_only(comm, described) or ""
-
-
-def _subdomains(count: int) -> str:
-    return "1 subdomain" if count == 1 else f"{count} subdomains"
 
 
 def _cost_lines(
@@ -81,10 +79,10 @@ def _cost_lines(
         raise CaseError(solver_plan.WITHOUT_INVERSE)
     solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
     yield f"solver     {solver}"
-    for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
-        yield f"rank {rank:<5} {_subdomains(count)}, about {problems[0].components * n} degrees of freedom"
-    columns = multipliers if plan.preconditioner == "influence" else 0
     components = [problem.components for problem in problems]
+    for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
+        yield f"rank {rank:<5} {count} subdomain{'s' * (count > 1)}, about {components[0] * n} degrees of freedom"
+    columns = multipliers if plan.preconditioner == "influence" else 0
     memory = partition_policy.memory(nodes, subdomains, components, columns)
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
@@ -98,7 +96,7 @@ def _cost_lines(
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
-    """Yield lines about the fibres: counts and sizes, mixed phases, and the match of positions."""
+    """Yield lines about the fibres: counts and sizes, debonded arcs, mixed phases, and the match of positions."""
     if case.interface is not None or case.cell.table is not None or case.cell.has_own_mesh:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
@@ -107,8 +105,14 @@ def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[
             fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
             sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
         yield f"fibres     {summary.fibres}, numbered from 1{sizes}"
+    records = FibreInfo.all_of(case, summary, np.ones(summary.fibres)) if case.arcs else ()
+    for label, interface in interface_section.labelled(case.interfaces):
+        for number, arc in enumerate(interface.debonded):
+            angle = "[angle] values" if arc.angle is None else f"angle {arc.angle:g}"
+            chosen = "all" if isinstance(arc.fibre, str) else ", ".join(str(records[k - 1]) for k in arc.fibre)
+            yield f"arc        [{label}] debonded[{number}]: {angle} about {arc.centre:g} degrees, fibre {chosen}"
     if case.cell.mix is not None:
-        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii
         mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
         yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
     if case.cell.match is not None:

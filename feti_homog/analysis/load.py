@@ -15,8 +15,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     The point has `tips` on debonded arcs for a load in the plane.  The case may also ask for `sensitivities`.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
-    bonds = context.bonds(None)
-    state = cell.equilibrium(context.loads.load(target), bonds, cell.no_multipliers())
+    load, bonds = context.loads.load(target), context.bonds(None)
+    state = cell.equilibrium(load, bonds, cell.no_multipliers())
     responses = context.loads.responses(state, 1.0)
     for response, problem in zip(responses, ("load", "load, along the fibres"), strict=False):
         context.progress.say(context.checks.record(problem, response))
@@ -28,7 +28,5 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:
         point["tips"] = tip_rates(context, responses[:1], ["strain"])
-    document: dict[str, Any] = {"load": LoadPoint(**point)}
-    if context.case.output.sensitivities:
-        document |= load_sensitivities(context, context.loads.load(target), responses)
-    return document
+    rates = load_sensitivities(context, load, responses) if context.case.output.sensitivities else {}
+    return {"load": LoadPoint(**point)} | rates

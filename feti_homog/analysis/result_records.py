@@ -150,8 +150,7 @@ class PathPoint:
     stored: float = described("elastic energy stored per area of the cell", records.STRESS)
     stored_in_springs: float = described("part of `stored` in elastic bonds", records.STRESS)
     mesh_error: float | None = described(
-        "estimated relative mesh error of `stored`, at the points that `states` in [output] chooses",
-        default=None,
+        "estimated relative mesh error of `stored`, at the points that `states` in [output] chooses", default=None
     )
     work: float = described(
         "work of the loads, with a temperature, so far per area of the cell: `stored` + `dissipated`, with friction + "
@@ -172,8 +171,7 @@ class PathPoint:
         default=None,
     )
     dissipation_ratio: float | None = described(
-        "`dissipated` / `fracture_energy`, once a bond has broken; 1 if breaks lose only the toughness",
-        default=None,
+        "`dissipated` / `fracture_energy`, once a bond has broken; 1 if breaks lose only the toughness", default=None
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)

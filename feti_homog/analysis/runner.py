@@ -213,7 +213,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         "case": cell.case.resolved(),
         "digest": mpi_errors.on_root(cell.comm, cell.case.digest),
         "cell": cell_info,
-        "fibres": FibreInfo.all_of(cell),
+        "fibres": FibreInfo.all_of(cell.case, cell.summary, cell.strength_factors),
         "solver": replace(SolverInfo.of(cell, checks.iterations, checks.reasons), options=options or None),
         "checks": checks.errors,
         "check_tolerance": checks.tolerance("jump"),

@@ -4,7 +4,11 @@ Two classes with the same name, `implementation`, implement a law: runs use the 
 results use the class in `verify`, with its own formulas.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.schema import wording
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,6 @@ class BondLawEntry:
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows with damage before a bond breaks.
-        has_process_zone: whether elements must resolve the length of the zone where bonds break.
     """
 
     name: str
@@ -31,7 +34,16 @@ class BondLawEntry:
     needs: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     softens: bool = False
-    has_process_zone: bool = False
+
+    def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
+        """Word the fault of a required key that a table lacks, with a value that the user may choose."""
+        words = f": missing; law = {wording.toml_value(self.name)} needs it"
+        if (normal := name.replace("tangential", "normal")) != name:
+            return f"{words}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
+        stiffness = (
+            "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
+        )
+        return f"{words}, such as {stiffness}" if name == STIFFNESSES[0] else words
 
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
@@ -57,7 +69,6 @@ REGISTRY = (
         "the energy of the bond's spring / G_c, see toughness",
         ((r"G_\mathrm{Ic}", "toughness", False),),
         needs=STIFFNESSES,
-        has_process_zone=True,
     ),
     *(
         BondLawEntry(
@@ -68,7 +79,6 @@ REGISTRY = (
             ((r"N", "normal_strength", True), (r"S", "tangential_strength", True)),
             needs=needs,
             softens=True,
-            has_process_zone=True,
         )
         for name, description, needs in (
             ("bilinear", "linear softening", (*STIFFNESSES, *COHESIVE)),

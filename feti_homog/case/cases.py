@@ -284,9 +284,11 @@ def check_phases(case: Case, phases: Iterable[str]) -> None:
     without = [phase for phase, source in sources.items() if source not in case.materials]
     faults = [f"[material.{wording.toml_key(phase)}]: missing section; the mesh has this phase" for phase in without]
     unused = [phase for phase in case.materials if phase not in sources.values()]
-    has = ", ".join(map(wording.toml_key, sources))
-    if len(unused) == len(without) == 1 and not case.cell.phases:
+    has, missing = (", ".join(map(wording.toml_key, some)) for some in (sources, without))
+    if len(unused) == len(without) == 1 and not case.cell.phases and "matrix" not in without:
         has += f". If they are the same, add to [cell]: phases = {{{unused[0]} = {wording.toml_value(without[0])}}}"
+    elif without:
+        has += f". If it is {missing.replace(', ', ' or ')}, rename the section"
     faults += [f"[material.{wording.toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused]
     if faults:
         raise CaseError(*faults)

@@ -41,6 +41,7 @@ MESH, PIXELS, OWN_MESH = GEOMETRY.among("mesh"), GEOMETRY.among("pixels"), GEOME
 MESHED, SIZED = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among(*CIRCULAR, "table", "pixels")
 FROM_A_FILE, REPAIRABLE = GEOMETRY.among("table", "mesh", "pixels"), GEOMETRY.among("table", "mesh")
 random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
+length_key = partial(key, types.real(least=1e-9, most=1e9), unit="length")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,21 +66,12 @@ class Cell:
         unless=("match", "mix"),
         default_words="required, or given by match or mix",
     )
-    width: float | None = meshed_key(
-        types.real(least=1e-9, most=1e9),
-        "Width of the cell.",
-        unit="length",
-        absent="1, or given by fibre_radius or the table",
+    width: float | None = length_key(
+        "Width of the cell.", only=MESHED, absent="1, or given by fibre_radius or the table"
     )
-    height: float | None = key(
-        types.real(least=1e-9, most=1e9), "Height of the cell.", unit="length", only=TABLE, absent="given by the table"
-    )
-    fibre_radius: float | None = key(
-        types.real(least=1e-9, most=1e9),
-        "Mean radius of the fibres, in place of width.",
-        unit="length",
-        only=ALL_CIRCULAR,
-        absent="given by width",
+    height: float | None = length_key("Height of the cell.", only=TABLE, absent="given by the table")
+    fibre_radius: float | None = length_key(
+        "Mean radius of the fibres, in place of width.", only=ALL_CIRCULAR, absent="given by width"
     )
     coating: float | None = meshed_key(
         types.real(least=0.01, most=1.0),
@@ -246,7 +238,7 @@ class Cell:
         'The phase, or "void", of each number in an image, such as {0 = "matrix", 255 = "fibre"}.',
         only=PIXELS,
     )
-    pixel: float = key(types.real(least=1e-9, most=1e9), "Side of a pixel.", unit="length", default=1.0, only=PIXELS)
+    pixel: float = length_key("Side of a pixel.", default=1.0, only=PIXELS)
     smooth: bool = key(
         types.boolean,
         "With false, each pixel becomes two triangles, whose diagonals alternate. With true, gmsh meshes the regions "

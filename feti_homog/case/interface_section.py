@@ -12,6 +12,14 @@ from feti_homog.schema import key, types
 T = TypeVar("T")
 pair_key = partial(key, by_pair=True)
 """Make a key that may have a value for each [[interface]] section; all other keys have one value."""
+IF_SOFTENING, IF_BY_TABLE = (kinds.BREAKING, kinds.SOFTENING), (kinds.BREAKING, kinds.BY_TABLE)
+WITH_BOTH = 'law = "bilinear" for strengths with toughnesses'
+strength_key = partial(
+    pair_key, kinds.STRENGTH, unit="stress", absent="inf", only=(kinds.BREAKING, kinds.BY_STRENGTH), instead=WITH_BOTH
+)
+stiffness_key = partial(pair_key, kinds.STIFFNESS, unit="stress / length", absent="inf", only=kinds.MECHANICAL)
+toughness_key = partial(pair_key, kinds.TOUGHNESS, unit="stress * length", default=None, only=IF_SOFTENING)
+branch_key = partial(key, kinds.NUMBERS_ABOVE, default=None, only=IF_BY_TABLE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +31,7 @@ class Arc:
 
     fibre: str | tuple[int, ...] = key(
         kinds.FIBRES,
-        "The fibres, numbered as in the arrangement; in the hexagonal cell, 1 is at the corners, 2 in the middle.",
+        "The fibres, as `feti-homog fibres` numbers them; in the hexagonal cell, 1 is at the corners, 2 in the middle.",
     )
     centre: float = key(
         types.real(least=-360.0, most=360.0),
@@ -99,20 +107,10 @@ class InterfaceSection:
         'mesh (whose lines in a physical curve "debonded" are debonded, too).',
         default=(),
     )
-    normal_stiffness: float | None = pair_key(
-        kinds.STIFFNESS,
-        "Stiffness k_n = normal traction / opening: of unbroken bonds, and of broken faces in contact.",
-        unit="stress / length",
-        absent="inf",
-        only=kinds.MECHANICAL,
+    normal_stiffness: float | None = stiffness_key(
+        "Stiffness k_n = normal traction / opening: of unbroken bonds, and of broken faces in contact."
     )
-    tangential_stiffness: float | None = pair_key(
-        kinds.STIFFNESS,
-        "Stiffness k_t = tangential traction / slip, of unbroken bonds.",
-        unit="stress / length",
-        absent="inf",
-        only=kinds.MECHANICAL,
-    )
+    tangential_stiffness: float | None = stiffness_key("Stiffness k_t = tangential traction / slip, of unbroken bonds.")
     axial_stiffness: float | None = pair_key(
         types.POSITIVE_OR_INF,
         "Stiffness k_a = traction / slip along the fibre, of unbroken bonds; inf: no slip along the fibre.",
@@ -127,21 +125,13 @@ class InterfaceSection:
         absent="inf",
         only=kinds.CONDUCTIVITY,
     )
-    normal_strength: float | None = pair_key(
-        kinds.STRENGTH,
+    normal_strength: float | None = strength_key(
         "R^n: normal traction at which a bond breaks; with a law that softens, N: normal traction at which its damage "
-        "begins. A force per area: it does not depend on the mesh.",
-        unit="stress",
-        absent="inf",
-        only=(kinds.BREAKING, kinds.BY_STRENGTH),
+        "begins. A force per area: it does not depend on the mesh."
     )
-    tangential_strength: float | None = pair_key(
-        kinds.STRENGTH,
+    tangential_strength: float | None = strength_key(
         "R^t: tangential traction at which a bond breaks; with a law that softens, S: traction in the plane and along "
-        "the fibre at which its damage begins.",
-        unit="stress",
-        absent="inf",
-        only=(kinds.BREAKING, kinds.BY_STRENGTH),
+        "the fibre at which its damage begins."
     )
     axial_strength: float | None = pair_key(
         types.POSITIVE_OR_INF,
@@ -167,53 +157,39 @@ class InterfaceSection:
         default=DEFAULT,
         only=kinds.BREAKING,
     )
-    normal_toughness: float | None = pair_key(
-        kinds.TOUGHNESS,
-        "G_n: energy per area that breaks a bond in pure opening, 1 to 1e12 times N^2 / (2 normal_stiffness).",
-        unit="stress * length",
-        default=None,
-        only=(kinds.BREAKING, kinds.SOFTENING),
+    normal_toughness: float | None = toughness_key(
+        "G_n: energy per area that breaks a bond in pure opening, 1 to 1e12 times N^2 / (2 normal_stiffness)."
     )
-    tangential_toughness: float | None = pair_key(
-        kinds.TOUGHNESS,
+    tangential_toughness: float | None = toughness_key(
         "G_t: energy per area in pure shear. In mixed modes, damage begins at (t_n / N)^2 + (t_t / S)^2 = 1, and the "
-        "energy is G_n + (G_t - G_n) B^mixing_exponent; B is the share of shear in the energy of undamaged springs.",
-        unit="stress * length",
-        default=None,
-        only=(kinds.BREAKING, kinds.SOFTENING),
+        "energy is G_n + (G_t - G_n) B^mixing_exponent; B is the share of shear in the energy of undamaged springs."
     )
     mixing_exponent: float = pair_key(
         types.real(least=0.5, most=100.0),
         "Exponent of Benzeggagh and Kenane's toughness, see tangential_toughness; below 0.5 its slope has no bound.",
         default=2.0,
-        only=(kinds.BREAKING, kinds.SOFTENING),
+        only=IF_SOFTENING,
     )
     teeth: int | None = key(
         types.integer(least=1, most=10_000),
         "Number of damage steps, each of which is an event. Any number dissipates the energy of the law.",
         absent="as few as softening_tolerance allows",
-        only=(kinds.BREAKING, kinds.SOFTENING),
+        only=IF_SOFTENING,
     )
     softening_tolerance: float = key(
         types.real(above=0.0, most=1.0),
         "Largest excess of the first tooth over the peak traction / peak traction.",
         default=0.02,
-        only=(kinds.BREAKING, kinds.SOFTENING),
+        only=IF_SOFTENING,
     )
-    openings: tuple[float, ...] | None = key(
-        kinds.NUMBERS_ABOVE,
+    openings: tuple[float, ...] | None = branch_key(
         "Rising openings of the softening branch in pure opening: the first at the peak, on the line of "
         "normal_stiffness (by default, first traction / first opening), the last at zero traction.",
         unit="length",
-        default=None,
-        only=(kinds.BREAKING, kinds.BY_TABLE),
     )
-    tractions: tuple[float, ...] | None = key(
-        kinds.NUMBERS_ABOVE,
+    tractions: tuple[float, ...] | None = branch_key(
         "Tractions at the openings, falling to 0. In other modes the branch is stretched to the toughness of the mode.",
         unit="stress",
-        default=None,
-        only=(kinds.BREAKING, kinds.BY_TABLE),
     )
     toughness: float | None = pair_key(
         kinds.TOUGHNESS,
@@ -222,6 +198,7 @@ class InterfaceSection:
         "G_III = t_a^2 / (2 k_a) adds to G_II.",
         unit="stress * length",
         only=kinds.BY_ENERGY,
+        instead='normal_ and tangential_toughness: law = "bilinear" has both, with stiffnesses and strengths of both',
     )
     growth: str = key(
         types.choice("released", "springs"),

@@ -20,6 +20,17 @@ FORMS_OF = {
     for name in keys.keys_of(contents)
 }
 """The material forms that have a constant, by the name of the constant."""
+DATA_SHEET = {
+    **dict.fromkeys(("e1", "e11", "el"), "E_axial"),
+    **dict.fromkeys(("e2", "e22", "et"), "E_transverse"),
+    **dict.fromkeys(("nu12", "nu13", "nult", "v12", "v13"), "nu_axial"),
+    **dict.fromkeys(("nu23", "nutt", "nut", "v23"), "nu_transverse"),
+    **dict.fromkeys(("g12", "g13", "glt"), "G_axial"),
+    **dict.fromkeys(("g23", "gtt", "gt"), "G_transverse"),
+    **dict.fromkeys(("alpha1", "alpha11", "alphal", "cte1", "cte11", "ctel"), "expansion_axial"),
+    **dict.fromkeys(("alpha2", "alpha22", "alphat", "cte2", "cte22", "ctet"), "expansion_transverse"),
+}
+"""Names of constants on data sheets, whose axis 1 is along the fibres, and keys of this program for them."""
 
 
 def read_materials(
@@ -52,7 +63,7 @@ def read_materials(
             reader.faults.append(f'[{section}]: belongs to geometry = "mesh", not {wording.toml_value(geometry)}')
         elif (material := _read_material(constants, section, plane, reader)) is not None:
             materials[phase] = material
-    needed = (phase_names.MATRIX, *(fibres or ()))
+    needed = () if geometry == "mesh" and table else (phase_names.MATRIX, *(fibres or ()))  # a mesh lists its names
     reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
     return materials
 
@@ -69,9 +80,7 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     """List coatings without a material, and a coating material without coatings; [] for a user's mesh."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
-    has_coatings = cell.coating is not None
-    if cell.table is not None:
-        has_coatings = bool((cell.table.coating > 0).any())
+    has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())
     if has_coatings and phase_names.COATING not in materials:
         return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
     if not has_coatings and phase_names.COATING in materials:
@@ -85,11 +94,16 @@ def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
     """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
-    given: dict[str, list[str]] = {}
+    names, given = [*table] if isinstance(table, dict) else [], dict[str, list[str]]()
+    sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
+    if not sheet.keys() <= FORMS_OF.keys():
+        words = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
+        reader.faults.append(f"[{section}] {words}: give {', '.join(sheet.values())}")
+        return None
     for name, (form, *further) in FORMS_OF.items():
-        if isinstance(table, dict) and name in table and not further:
+        if name in names and not further:
             given.setdefault(form, []).append(name)
-    forms = list(given) or ["conductor" if isinstance(table, dict) and "conductivity" in table else "isotropic"]
+    forms = list(given) or ["conductor" if "conductivity" in names else "isotropic"]
     if len(forms) > 1:
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
         way = laws.OF_DATA_SHEETS if "orthotropic" in forms else "a material is of one kind"

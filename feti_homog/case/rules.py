@@ -133,7 +133,8 @@ def _conditional_keys() -> Iterator[Rule]:
         for name, entry in keys.keys_of(contents).items():
             for k, condition in enumerate(entry.only):
                 above, values = entry.only[:k], _values(condition.selector)
-                yield belonging((*path, name), condition, values, *above, instead=entry.instead)
+                instead = entry.instead if condition is entry.only[-1] else ""
+                yield belonging((*path, name), condition, values, *above, instead=instead)
             if entry.required and entry.only:
                 line = f"missing; expected {entry.type.expected}"
                 yield needed(path, name, line, *entry.only, unless=entry.unless)
@@ -230,8 +231,8 @@ def _bonds() -> Iterator[Rule]:
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
         for name in law.needs:
-            missing = f"missing; law = {wording.toml_value(law.name)} needs it"
-            yield needed(INTERFACE, name, missing, kinds.BREAKING, kinds.CRITERION.among(law.name))
+            rule = needed(INTERFACE, name, "", kinds.BREAKING, kinds.CRITERION.among(law.name))
+            yield replace(rule, words=partial(law.missing, name))
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
     line = f"[interface]: missing section; {type_} needs it"
     yield needed((), "interface", line, kinds.ENVELOPE_ANALYSIS)

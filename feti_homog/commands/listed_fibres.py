@@ -11,7 +11,7 @@ from feti_homog.case import cases, cell_section
 from feti_homog.errors import CaseError
 from feti_homog.mesh import Torus, arrange, mesh_fibres
 from feti_homog.mesh.fill import gmsh_mesher, pixel_mesher
-from feti_homog.microstructure import periodic_table
+from feti_homog.microstructure import periodic_table, phase_names
 from feti_homog.microstructure.shapes import Ellipses, shapes
 from feti_homog.typing import Float
 
@@ -19,8 +19,8 @@ from feti_homog.typing import Float
 def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
-    The table has a row for each fibre and void, ordered by fibre number.  Ellipses have the columns `a`, `b` and
-    `angle`, coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
+    The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
+    coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
 
     Raises:
         CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is neither disc nor ellipse.
@@ -43,11 +43,11 @@ def table(source: Path) -> str:
         columns[name] = [new or old for old, new in zip(before, _words(values), strict=True)]
     if fibres.cores.any():
         columns["inner_radius"] = _words(fibres.cores)
+    columns["number"] = ["" if name == phase_names.VOID else str(k) for k, name in enumerate(fibres.phases, 1)]
     rows = map(",".join, zip(*columns.values(), strict=True))
-    width, height = fibres.size.tolist()
     reach = fibres.ellipses.longest[:, None]
     low, high = (ellipses.centres + reach).min(axis=0), (ellipses.centres - reach).max(axis=0) - fibres.size
-    left, bottom = np.clip(fibres.origin, high, low).tolist()
+    (width, height), (left, bottom) = fibres.size.tolist(), np.clip(fibres.origin, high, low).tolist()
     size = f"# width = {width!r}, height = {height!r}, left = {left!r}, bottom = {bottom!r}"
     return "\n".join([size, ",".join(columns), *rows])
 
@@ -95,10 +95,10 @@ def read(source: Path) -> ListedFibres:
     """
     fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
     sizes = np.column_stack([fibres.ellipses.centres, fibres.radii, fibres.coatings])
-    lost = np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1
-    if len(lost):
-        listed = ", ".join(map(str, lost[:10]))
-        raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {listed}")
+    lost = [*map(str, np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1)]
+    if lost:
+        line = f"{source}: fibres that are neither round nor ellipses have no radius: {', '.join(lost[:10])}"
+        raise CaseError(f"{line}; `feti-homog check` prints the centres of debonded ones")
     return fibres
 
 
@@ -146,6 +146,6 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     ellipses = Ellipses(centres, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
-    columns = {} if cell.table is None else {name: of[arrangement.row] for name, of in cell.table.columns.items()}
-    others = shapes.columns_without_tips(columns) if columns else {}
+    columns = {} if cell.table is None else cell.table.columns
+    others = shapes.columns_without_tips({name: of[arrangement.row] for name, of in columns.items()}) if columns else {}
     return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, others)

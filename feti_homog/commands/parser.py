@@ -14,8 +14,8 @@ from feti_homog.system.petsc import option_table
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 FIBRES_HELP = (
-    "Print a table with a row for each fibre: centre, radius or semi-axes, and phase. A case with [cell] geometry = "
-    '"table" reads the table and has the same cell again.'
+    "Print a table with a row for each fibre: centre, radius or semi-axes, phase, and its number, as in an arc of "
+    'debonded. A case with [cell] geometry = "table" reads the table and has the same cell again.'
 )
 EXPORT_HELP = (
     'Print the constants of a stiffness or envelope in plane = "generalized", or a conductivity, as a material card. '

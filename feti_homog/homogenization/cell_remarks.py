@@ -96,13 +96,15 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List a remark on sides without images, else on linear elements, teeth of `bonds` (0: unknown), fibre fraction."""
+    """List a remark on sides without images, else on linear elements, scatter, `bonds` with teeth, fibres."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
         return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
     if case.analysis.type == "envelope" and cell.order == 1:
         lines = ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
+    if cell.geometry == "random" and case.output.mesh_error:
+        lines += (f'[cell] seed = {cell.seed}: "+-" has mesh errors, no scatter, as realisations in [sweep] have',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
@@ -121,7 +123,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
-    """List springs with a strength that are too soft to represent rigid bonds.
+    """List springs of bonds that break, if they are too soft to represent rigid bonds.
 
     `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r), the ratio of the
     matrix modulus in the plane state to spring stiffness and mean radius.  At 1 / 50, the limit of Turon et al. (Eng.
@@ -129,7 +131,7 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
     """
     lines, radii = list[str](), radii[np.isfinite(radii)]
     for section, bond in interface_section.labelled(case.interfaces if len(radii) else ()):
-        if not any(getattr(bond, name) for name in bond_laws.STRENGTHS):
+        if not any(getattr(bond, name) for name in (*bond_laws.STRENGTHS, "toughness")):
             continue
         k, name = min((getattr(bond, name) or math.inf, name) for name in bond_laws.STIFFNESSES)
         if (ratio := k * radii.mean() / _modulus(case, "matrix")) < 50.0:
@@ -155,9 +157,7 @@ def process_zone(case: Case) -> float | None:
     for bond in case.interfaces:
         pure = (bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)
         lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
-    if not phase_laws.has_process_zone(case) or not lengths:
-        return None
-    return min(_modulus(case, phase) for phase in case.materials) * min(lengths)
+    return min(_modulus(case, phase) for phase in case.materials) * min(lengths) if lengths else None
 
 
 def _modulus(case: Case, phase: str) -> float:
@@ -166,28 +166,32 @@ def _modulus(case: Case, phase: str) -> float:
     return min(moduli.E1, moduli.E2)
 
 
-def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """List warnings about cohesive laws, and about process zones that interface elements do not resolve.
+def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
+    """List warnings about cohesive laws, and process zones of unlikely lengths or that elements do not resolve.
 
     Args:
         width: cell width.
         edge: longest coarse edge between phases, which `refine` halves.
+        radii: radii of fibres, NaN unless round.
     """
     length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
-    resolved = RESOLVED_SOFTENING if softens else RESOLVED
-    if length is None or edge / 2**case.cell.refine <= resolved * length:
+    if length is None:
         return lines
+    law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
+    ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
+    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # units
+    zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" * doubt
+    if edge / 2**case.cell.refine <= resolved * length:
+        return [f"{law}: the process zone is {zone}"] * doubt + lines
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
-    if softens:
-        zone, fraction = f"E' G / N^2 = {length:.3g} long", "a third"
-    else:
+    if not softens:
         # The bonds of the shortest process zone break at this traction in pure opening.
         pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
         stiffness, toughness = max(pair for pair in pairs if all(pair))
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
-        zone, fraction = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
-    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {fraction} of that"
+        zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}"
+    limit = f"elements should be at most {'a third' if softens else 'half'} of that"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.
     needed = resolved * length * 2**case.cell.refine / width

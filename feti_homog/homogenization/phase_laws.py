@@ -145,8 +145,3 @@ def strength_factors(case: Case, fibres: int) -> Float:
     from feti_homog.microstructure import periodic_table  # imports the windows of tables
 
     return factors * table.strength[periodic_table.fibre_rows(table, case.cell.window)]
-
-
-def has_process_zone(case: Case) -> bool:
-    """Return whether elements must resolve the length along which bonds break; false without an interface."""
-    return case.interface is not None and bond_laws.LAWS[case.interface.criterion].has_process_zone

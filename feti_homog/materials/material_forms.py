@@ -6,7 +6,7 @@ Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -25,8 +25,8 @@ MATRIX = types.either(
 )
 EXPANSION = types.either("a number or a list of three numbers", types.real(), types.list_of(types.real(), "", count=3))
 PER_TEMPERATURE, CONDUCTIVITY_UNIT = "1 / temperature", "conductivity"
-thermal = partial(key, types.real(), unit=PER_TEMPERATURE, default=None)
-thermal_by_axis = partial(key, EXPANSION, unit=PER_TEMPERATURE, default=None)
+thermal = partial(key, unit=PER_TEMPERATURE, default=None)
+ONE_EXPANSION = replace(types.real(), expected="a number, or expansion_axial and expansion_transverse in its place")
 EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 """Keys that are given together, in place of one expansion."""
 
@@ -80,7 +80,7 @@ class Isotropic:
 
     young: float = stress("Young's modulus.")
     poisson: float = key(types.real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
-    expansion: float | None = thermal("Thermal expansion.")
+    expansion: float | None = thermal(types.real(), "Thermal expansion.")
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
     conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
@@ -102,8 +102,8 @@ class Orthotropic:
     G13: float | None = stress("Shear modulus between axis 1 and x3; generalized plane strain needs it.", default=None)
     G23: float | None = stress("Shear modulus between axis 2 and x3; generalized plane strain needs it.", default=None)
     angle: float = key(types.real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
-    expansion: float | tuple[float, ...] | None = thermal_by_axis(
-        "Thermal expansion, the same in all directions or along axes 1, 2, 3."
+    expansion: float | tuple[float, ...] | None = thermal(
+        EXPANSION, "Thermal expansion, the same in all directions or along axes 1, 2, 3."
     )
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
     conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
@@ -132,9 +132,9 @@ class TransverselyIsotropic:
     G_axial: float | None = stress(
         "Shear modulus between x3 and the plane; generalized plane strain needs it.", default=None
     )
-    expansion: float | None = thermal("Thermal expansion, the same in all directions.")
-    expansion_axial: float | None = thermal("Thermal expansion along x3; with expansion_transverse.")
-    expansion_transverse: float | None = thermal("Thermal expansion in the plane; with expansion_axial.")
+    expansion: float | None = thermal(ONE_EXPANSION, "Thermal expansion, the same in all directions.")
+    expansion_axial: float | None = thermal(types.real(), "Thermal expansion along x3; with expansion_transverse.")
+    expansion_transverse: float | None = thermal(types.real(), "Thermal expansion in the plane; with expansion_axial.")
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
     conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)
 
@@ -151,8 +151,8 @@ class General:
         "The stiffness, symmetric and positive definite; in a 6x6 stiffness, 23 and 13 are coupled only to each other.",
         unit="stress",
     )
-    expansion: float | tuple[float, ...] | None = thermal_by_axis(
-        "Thermal expansion, the same in all directions or along x1, x2, x3."
+    expansion: float | tuple[float, ...] | None = thermal(
+        EXPANSION, "Thermal expansion, the same in all directions or along x1, x2, x3."
     )
     strength: PhaseStrength | None = key(STRENGTH, UTILISATION, default=None)
     conductivity: Conductivity | None = key(CONDUCTIVITY, CONDUCTS, unit=CONDUCTIVITY_UNIT, default=None)

@@ -11,19 +11,19 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
-    **dict.fromkeys(("nu23", "nut"), ("nu_transverse",)),
-    **dict.fromkeys(("g23", "gt"), ("G_transverse",)),
-    **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion",)),
+    **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion", "expansion_axial", "expansion_transverse")),
     **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
     "shear_strength": ("tangential_strength",),
     **dict.fromkeys(("mu", "coefficient_of_friction", "friction_coefficient"), ("friction",)),
     **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness")),
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
+    "radius": ("fibre_radius",),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
 # Quantities and former keys without a key in this program, each with a hint.
 ABSENT = {
     "g": "it follows from young and poisson",
+    **dict.fromkeys(("diameter", "fibre_diameter", "fiber_diameter"), "give the radius (in [cell] fibre_radius)"),
     **{f"e{ij}": f"expected a shear strain as gamma{ij} = 2 E{ij}" for ij in (12, 13, 23)},
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
     "axial_friction": "leave it out: debonded faces slip freely along the fibres",

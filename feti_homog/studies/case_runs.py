@@ -79,7 +79,8 @@ def run_all(
         for entry, state in zip(sweep.entries, states, strict=True):
             for line in (state.document or {}).get("warnings", ()):  # one for each setting, the text before the colon
                 first.setdefault(line.partition(": ")[0], f"warning: {entry.folder}: {line}")
-        standard_streams.say("\n".join([*first.values(), f"{done} of {len(states)} cases done in {directory}"]))
+        total = f"{done} of {len(states)} cases done; `feti-homog collect {directory}` makes tables of them"
+        standard_streams.say("\n".join([*first.values(), total]))
     if failed:
         if comm.rank == 0:
             standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))

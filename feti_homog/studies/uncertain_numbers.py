@@ -133,15 +133,10 @@ def _means(
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
     """Return the number at a path, or None if there is no number or the path fits several sections."""
-    result = _at(document, toml_files.in_lists(path))
-    return float(result) if types.is_number(result) else None
-
-
-def _at(document: Any, path: toml_files.TomlPath) -> Any:
-    result = document
-    for name in path:
+    result: Any = document
+    for name in toml_files.in_lists(path):
         result = result[0] if isinstance(result, list) and len(result) == 1 else result
         if isinstance(result, list):  # sections of the same name are numbered from 1
             result = {str(number): each for number, each in enumerate(result, start=1)}
         result = result.get(name) if isinstance(result, dict) else None
-    return result
+    return float(result) if types.is_number(result) else None

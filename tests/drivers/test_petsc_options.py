@@ -66,6 +66,8 @@ def test_options_of_the_library_of_a_solver_that_the_run_does_not_make(tmp_path,
 # What is wrong with options, by when they are refused: with these words, in one line each.
 REFUSED = {
     "values": {
+        "-feti_schur_mat_mumps_icntl_19 0": "no such option: MUMPS would not condense",
+        "-feti_schur_mat_mumps_icntl_28 2": "0 or 1, because one rank analyses its matrices",
         "-feti_pc_type ilu": "expected one of auto, none, lumped, dirichlet, influence",
         "-feti_dual_operator direct": "expected one of auto, implicit, explicit",
         "-feti_coarse_space deluxe": "expected one of auto, natural, adaptive",

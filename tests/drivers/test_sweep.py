@@ -27,7 +27,7 @@ def after_results(count, rank=None):
 def test_a_sweep_writes_every_case_at_any_number_of_ranks(tmp_path, ranks, words):
     out = tmp_path / "new" / "sweep"
     job = swept(out, sweep_file(tmp_path, TWO), *words, ranks=ranks)
-    assert "2 of 2 cases done" in job.stdout and job.stdout.count("cell.fibre_fraction = 0.3") == 1
+    assert "2 of 2 cases done; `feti-homog collect" in job.stdout and job.stdout.count("cell.fibre_fraction = 0.3") == 1
     assert {p.name for p in out.iterdir()} == {
         "case-0001", "case-0002", "cases.csv", "sweep.json",
     }  # fmt: skip

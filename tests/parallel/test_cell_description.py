@@ -60,3 +60,25 @@ def test_friction_without_influence_columns_is_refused_by_both(comm, option):
     with pytest.raises(CaseError) as of_check, case_options(case.petsc):
         describe(case, comm)
     assert of_run.value.faults == of_check.value.faults
+
+
+ARCS = """[interface]
+debonded = [{fibre = 2, centre = 90, angle = 60}, {fibre = "all", angle = 30}, {fibre = [1, 2], angle = 0}]
+"""
+LISTED = """geometry = "table"
+width = 1.0
+height = 1.0
+fibre_list = [{x = 0.2, y = 0.3, radius = 0.1, phase = "void"}, {x = 0.75, y = 0.25, radius = 0.2},
+    {x = 0.5, y = 0.75, radius = 0.15}]"""
+
+
+def test_the_fibres_of_arcs_are_named_by_number_row_and_centre(comm):
+    """Numbers count the fibres of the list, without its void."""
+    text = changed(('geometry = "hexagonal"\nfibre_fraction = 0.4', LISTED), ("= 0.05", "= 0.2"), end=ARCS)
+    printed = comm.bcast(describe(Case.parse(tomllib.loads(text)), comm))
+    first, second = "1 (fibre, row 2, centre (0.75, 0.25))", "2 (fibre, row 3, centre (0.5, 0.75))"
+    assert [line for line in printed.splitlines() if line.startswith("arc")] == [
+        f"arc        [interface] debonded[0]: angle 60 about 90 degrees, fibre {second}",
+        "arc        [interface] debonded[1]: angle 30 about 0 degrees, fibre all",
+        f"arc        [interface] debonded[2]: angle 0 about 0 degrees, fibre {first}, {second}",
+    ]

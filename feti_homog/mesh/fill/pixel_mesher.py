@@ -8,7 +8,6 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.periodic_topology import Torus, components, present
 from feti_homog.mesh.readers import msh_reader
 from feti_homog.microstructure import label_image, phase_names
-from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool
 
 
@@ -47,10 +46,6 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
         phases=tuple(name for name in phases if name != phase_names.VOID),
         precedence=number,
         representative=representative,
-        ellipses=Ellipses.round(np.zeros((0, 3))),
-        arc_edges=np.zeros((0, 2), np.int32),
-        arc_circle=np.zeros(0, np.int32),
-        debonded_edges=np.zeros((0, 2), np.int32),
         boundary=cell.boundary,
     )
     if faults := [] if len(solid) == phase.size else _void_faults(mesh, is_solid):

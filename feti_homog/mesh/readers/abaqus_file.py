@@ -24,6 +24,8 @@ SIZES: dict[str, tuple[int, ...]] = {
 }
 # Real numbers; Fortran writes 1.0D+00.
 REAL = r"(?i)[+-]?(([0-9]+(\.[0-9]*)?|\.[0-9]+)([ed][+-]?[0-9]+)?|nan|inf|infinity)"
+# Whole numbers; meshio writes 12.0 into sets.
+WHOLE = r"[0-9]{1,15}(\.0*)?"
 # Limit for the members of all sets together; in long files, the limit is the number of characters.
 MOST_MEMBERS = 10**6
 # The kinds of sets that name the phase of an element, in the order of precedence.
@@ -97,7 +99,8 @@ class _Content:
                     self.nodes[number] = [*(float(word.upper().replace("D", "E")) for word in words), 0.0, 0.0][:3]
             case "ELEMENT":
                 self._take_elements(block)
-            case "ELSET" if "INSTANCE" not in block.parameters:
+            # meshio copies gmsh's sets gmsh:..., which have no numbers of elements.
+            case "ELSET" if "INSTANCE" not in block.parameters and not block.parameter("ELSET").startswith("gmsh:"):
                 self._take_set(block)
             case "SOLID SECTION" | "SHELL SECTION" | "MEMBRANE SECTION":
                 name = block.parameter("ELSET")
@@ -130,7 +133,7 @@ class _Content:
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
-                {_integer(word)} if word.isdecimal() else self.members(name_of(word)) for word in row if word
+                {_integer(word)} if re.fullmatch(WHOLE, word) else self.members(name_of(word)) for word in row if word
             )
             if "GENERATE" in block.parameters:
                 first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
@@ -204,8 +207,8 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 
 def _integer(word: str) -> int:
-    """Convert a word into a whole number; ValueError for any other word."""
-    return int(_checked(word, "[+-]?[0-9]{1,15}", "a whole number of at most 15 digits"))
+    """Convert a word into a whole number, as 12 or 12.0; ValueError for any other word."""
+    return int(_checked(word, f"[+-]?{WHOLE}", "a whole number of at most 15 digits").partition(".")[0])
 
 
 def _checked(word: str, pattern: str, expected: str) -> str:

@@ -238,11 +238,13 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
             if group and group[0] != phase_names.VOID:
                 shares[group[0]] = shares.get(group[0], 0.0) + percent
     if shares:
-        largest = [_as_selected(name) for name in sorted(shares, key=lambda name: -shares[name])]
-        proposed = ["matrix", "fibre", *(f'"fibre:{k}"' for k in range(2, len(largest)))]
-        entries = ", ".join(f"{phase} = {name}" for phase, name in zip(proposed, largest, strict=False))
+        first, *smaller = sorted(shares, key=lambda name: ("fib" in name.casefold(), -shares[name]))
+        fibres = ["fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1))]  # groups of these names keep them
+        phases = ["matrix", *(name for name in fibres if name not in smaller)]
+        renamed = map(_as_selected, [first, *(name for name in smaller if name not in fibres)])
+        entries = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in zip(phases, renamed, strict=False))
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
-        faults[-1] += f". If {largest[0]} is the matrix, add to [cell]: phases = {{{entries}}}. "
+        faults[-1] += f". If {_as_selected(first)} is the matrix, add to [cell]: phases = {{{entries}}}. "
         faults[-1] += f"Shares of the area: {listed}"
     return faults
 

@@ -144,6 +144,8 @@ RULES: dict[str, OptionRule] = {
     "feti_ksp_divtol": ("a number above 1", lambda text: 1.0 < _real(text) < math.inf),
     "feti_ksp_max_it": _integer(1, 2**31 - 1),  # PETSc may have 32-bit integers
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
+    "feti_schur_mat_mumps_icntl_19": ("no such option: MUMPS would not condense", lambda text: False),
+    "feti_schur_mat_mumps_icntl_28": ("0 or 1, because one rank analyses its matrices", ("0", "1").__contains__),
     "feti_schur_pc_type": ("cholesky, because condensed matrices are symmetric", "cholesky".__eq__),
     "feti_schur_pc_factor_mat_solver_type": ("mumps, the only library with Schur complements", "mumps".__eq__),
     "feti_ksp_error_if_not_converged": ("false: a run reports such solves, and keeps its results", _is_false),
@@ -164,9 +166,7 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     Options with a single dash belong to PETSc.  The word after such an option is its value, unless that word begins
     another option or cannot be the value.  A negative number can be a value.
     """
-    ours: list[str] = []
-    petsc: list[str] = []
-    name = ""
+    ours, petsc, name = list[str](), list[str](), ""
     for word in argv:
         if _is_petsc(word):
             petsc.append(word)

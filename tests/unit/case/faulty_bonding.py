@@ -84,11 +84,11 @@ FAULTY_BONDINGS: dict[str, str] = {
     "[interface] toughness: missing; expected": of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"'),
     "[interface] scatter.shape: missing; expected a number at least 1 and at most 1000":
         of_type("path", PATH, "[interface]", "scatter = {seed = 1}"),
-    "[interface] debonded[0].fibre: missing; expected the number of a fibre, counted from 1, a list of ":
+    "[interface] debonded[0].fibre: missing; expected the number of a fibre, a list of ":
         debonded("{angle = 60}"),
     "[interface] debonded[0].fibre = 0: expected the": debonded("{fibre = 0, angle = 60}"),
     "[interface] debonded[0].fibre = []: expected the": debonded("{fibre = [], angle = 60}"),
-    '[interface] debonded[0].fibre = "every": expected the number of a fibre, counted from 1, a list of numbers':
+    '[interface] debonded[0].fibre = "every": expected the number of a fibre, a list of numbers':
         debonded('{fibre = "every", angle = 60}'),
     "[interface] debonded[0].fibre = [1, true]: expected the number of a fibre":
         debonded("{fibre = [1, true], angle = 60}"),
@@ -153,10 +153,20 @@ FAULTY_COHESIVE_LAWS: dict[str, str] = {
     }),
     '[interface] axial_friction = "prevented": unknown key; leave it out: debonded faces slip freely along ':
         of_type("path", PATH, "[interface]", "friction = 0.3", 'axial_friction = "prevented"'),
-    '[interface] tangential_strength: missing; law = "bilinear" needs it\n'
+    '[interface] tangential_strength: missing; law = "bilinear" needs it, such as normal_strength = 1.0\n'
     '[interface] normal_toughness: missing; law = "bilinear" needs it\n'
     '[interface] tangential_toughness: missing; law = "bilinear" needs it':
         of_type("path", PATH, "[interface]", *SOFTENING[1:3], 'law = "bilinear"', "normal_strength = 1.0"),
+    '[interface] normal_stiffness: missing; law = "bilinear" needs it, such as 100 E / r, E of the matrix, r of\n'
+    '[interface] tangential_stiffness: missing; law = "bilinear" needs it, such as normal_stiffness':
+        of_type("path", PATH, "[interface]", *SOFTENING[:1], *SOFTENING[3:], "normal_toughness = 1.0"),
+    '[interface] toughness = 2.0: belongs to law = "energy", not "max"; use normal_ and tangential_toughness: ':
+        of_type("path", PATH, "[interface]", "normal_strength = 1.0", "toughness = 2.0"),
+    '[interface] normal_strength = 1.0: belongs to law = "max" or "quadratic" or "bilinear" or "exponential" or '
+    '"table", not "energy"; use law = "bilinear" for strengths with toughnesses\n'
+    '[interface] normal_stiffness: missing; law = "energy" needs it, such as s^2 / (2 toughness) of a strength s':
+        of_type("path", PATH, "[interface]", 'law = "energy"', "tangential_stiffness = 1.0", "normal_strength = 1.0",
+                "toughness = 2.0"),
     '[interface] normal_strength: law = "bilinear" needs a finite one':
         of_type("path", PATH, "[interface]", *SOFTENING, "normal_toughness = 1").replace("th = 1.0", "th = inf", 1),
     "[interface] law, criterion: exclude each other; criterion is the older word for law":

@@ -199,6 +199,15 @@ def test_phases_of_mesh_and_case_must_match(tmp_path):
     missing, hint = caught.value.faults
     assert missing == "[material.surface2]: missing section; the mesh has this phase"
     assert hint.endswith('If they are the same, add to [cell]: phases = {fibre = "surface2"}')
+    other = case_of(tmp_path, MESH.replace("material.matrix", "material.resin"))  # a mesh may lack the matrix, too
+    with pytest.raises(CaseError) as caught:
+        check_phases(other, ["matrix", "fibre"])
+    assert caught.value.faults[1].endswith("it has matrix, fibre. If it is matrix, rename the section")
+    mapped = case_of(
+        tmp_path, MESH.replace('"cell.msh"', '"cell.msh"\nphases = {fibre = 2}').replace(".fibre]", ".glass]")
+    )
+    with pytest.raises(CaseError, match=r"it has matrix, fibre. If it is fibre, rename the section$"):
+        check_phases(mapped, ["matrix", "fibre"])
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress", "generalized"])

@@ -111,7 +111,11 @@ def test_keys_with_the_word_come_before_descriptions_with_it():
     ("word", "line"),
     [
         ("mesh_sise", "keys mesh_sise: no key, section or description has it; near words: mesh_size, mesh_error"),
-        ("alpha", "keys alpha: no key, section or description has it; near words: expansion"),
+        (
+            "alpha",
+            "keys alpha: no key, section or description has it; near words: expansion, expansion_axial, "
+            "expansion_transverse",
+        ),
         ("qwxz", "keys qwxz: no key, section or description has it; `feti-homog keys` lists all keys"),
     ],
 )

@@ -79,7 +79,7 @@ def test_the_table_of_ellipses_gives_the_cell(of, tmp_path):
     if of == "result":
         run(load(source), tmp_path / "result", Progress(MPI.COMM_SELF, quiet=True))
     (tmp_path / "t.csv").write_text(listed_fibres.table(tmp_path / "result" if of == "result" else source))
-    assert (tmp_path / "t.csv").read_text().splitlines()[1] == "x,y,radius,phase,a,b,angle,coating"
+    assert (tmp_path / "t.csv").read_text().splitlines()[1] == "x,y,radius,phase,a,b,angle,coating,number"
     again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', coating)
     for found, expected in zip(squares(load(again).cell), squares(load(source).cell), strict=True):
         assert found == pytest.approx(expected, abs=1e-9)
@@ -102,7 +102,9 @@ def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
     grid().write(tmp_path / "cell.msh")
     source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
-    with pytest.raises(CaseError, match=r"case.toml: fibres that are neither round nor ellipses have no radius: 1$"):
+    with pytest.raises(
+        CaseError, match=r"fibres that are neither round nor ellipses have no radius: 1; `feti-homog check` "
+    ):
         listed_fibres.table(source)
 
 
@@ -115,3 +117,10 @@ def test_units_and_names(tmp_path):
     assert (table.left, table.bottom) == (0.0, 0.0)
     moved = replace(load(source).cell, fibre_radius=None)
     assert np.abs(table.centres / table.width - arrange(moved).centres).max() < 1e-15
+
+
+def test_numbers_of_fibres_are_those_of_arcs_and_voids_have_none(tmp_path):
+    voids = 'geometry = "random"\nfibres = 2\nfibre_fraction = 0.3\nvoids = 0.05\n'
+    header, *rows = listed_fibres.table(case_of(tmp_path / "case.toml", voids)).splitlines()[1:]
+    assert header.split(",")[3] == "phase" and header.split(",")[-1] == "number"
+    assert [row.split(",")[3:] for row in rows] == [["fibre", "1"], ["fibre", "2"], ["void", ""]]

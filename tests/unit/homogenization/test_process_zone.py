@@ -47,7 +47,7 @@ def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=
 
 def warnings(case):
     mesh = coarse_mesh(case, MPI.COMM_SELF)
-    return cell_remarks.warnings(case, mesh.width, longest_edge(mesh))
+    return cell_remarks.warnings(case, mesh.width, longest_edge(mesh), np.array([7.5, np.nan]))
 
 
 @pytest.mark.parametrize(
@@ -132,8 +132,20 @@ def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():
         for k, G, pair in ((900.0, 8.0, ["coating", "matrix"]), (2025.0, 2.0, ["fibre", "coating"]))
     ]
     case = cases.parse(DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}, Path())
-    line = cell_remarks.warnings(case, 20.0, 50.0)[0]
+    line = cell_remarks.warnings(case, 20.0, 50.0, np.array([7.5]))[0]
     assert "for sigma_c = sqrt(2 k_n G_Ic) = 90, " in line and f"= {2790.0 / (1 - 0.33**2) / 4050:.3g} long" in line
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.1, 1.0, 100.0, 1e4])
+def test_a_toughness_in_another_unit_is_doubted(factor):
+    """E' G / N^2 in shear is 0.078 micrometres long, 0.0104 radii; ratios below 0.01 or above 100 are unlikely."""
+    bond = COHESIVE | {f"{mode}_toughness": factor * COHESIVE[f"{mode}_toughness"] for mode in ("normal", "tangential")}
+    bond |= {f"{mode}_stiffness": 1e5 * max(1.0, 1 / factor) for mode in ("normal", "tangential")}
+    case = cases.parse(case_of(coating=None).resolved() | {"interface": bond}, Path())
+    lines = [line for line in warnings(case) if "fibre radii: is the unit of toughness" in line]
+    ratio = factor * 2790.0 / (1 - 0.33**2) * 0.09 / 60.0**2 / 7.5
+    assert [f"long ({ratio:.2g} fibre radii" in line for line in lines] == [True] * (not 0.01 <= ratio <= 100.0)
+    assert len(lines) == (factor in (1e-3, 0.1, 1e4)) and all("the process zone is E' G / N^2 = " in n for n in lines)
 
 
 def test_a_mesh_of_ones_own_is_refined(tmp_path):

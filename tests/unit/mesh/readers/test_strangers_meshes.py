@@ -1,5 +1,6 @@
 """Meshes as other programs write them, with names that are no phases: [cell.phases] is all that a case needs."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -206,6 +207,34 @@ def test_the_matrix_proposed_is_the_largest_group(tmp_path, names):
         read(tmp_path / "a.msh")
     assert 'phases = {matrix = "glass", fibre = "epoxy"}' in error.value.faults[-1]
     assert '"epoxy": 25 %' in error.value.faults[-1] and '"glass": 75 %' in error.value.faults[-1]
+
+
+@pytest.mark.parametrize(
+    ("names", "proposed"),
+    [
+        ({1: "fibre", 2: "resin"}, '{matrix = "resin"}'),
+        ({1: "Fibers", 2: "resin"}, '{matrix = "resin", fibre = "Fibers"}'),
+        ({1: "fibre:2", 2: "resin"}, '{matrix = "resin"}'),
+    ],
+)
+def test_groups_of_fibres_are_not_proposed_as_the_matrix(tmp_path, names, proposed):
+    """Even if they are the largest."""
+    replace(grid(), names=names).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as error:
+        read(tmp_path / "a.msh")
+    assert f"add to [cell]: phases = {proposed}. Shares" in error.value.faults[-1]
+
+
+def test_sets_that_meshio_copies_from_gmsh_are_read(tmp_path):
+    """They have numbers such as 12.0, and entities of gmsh, which may be negative."""
+    by_meshio(tmp_path / "a.inp", None, "abaqus", sets=True)
+    expected, text = read(tmp_path / "a.inp", phases={"matrix": ("resin",), "fibre": ("glass",)}), ""
+    for line in (tmp_path / "a.inp").read_text().splitlines(keepends=True):
+        is_set = text.rfind("*ELSET") > text.rfind("*ELEMENT") and not line.startswith("*")
+        text += re.sub(r"(\d+)", r"\1.0", line) if is_set else line
+    (tmp_path / "b.inp").write_text(f"{text}*ELSET, ELSET=gmsh:bounding_entities\n2,3,-7,-6\n")
+    found = read(tmp_path / "b.inp", phases={"matrix": ("resin",), "fibre": ("glass",)})
+    assert "1.0,2.0," in text and (found.phase == expected.phase).all()
 
 
 def test_shares_of_a_group_are_those_of_all_its_surfaces(tmp_path):
