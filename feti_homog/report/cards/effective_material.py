@@ -209,11 +209,9 @@ def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
     return [f"{mark} {line}" for line in lines]
 
 
-def number(value: float, width: int = 24) -> str:
-    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` must be at least 12."""
-    value = float(value) + 0.0  # no -0.0
-    forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
-    return next(form for form in forms if len(form) <= width)
+def number(value: float) -> str:
+    """Write a value with nine significant digits, far below the mesh error, in at most 16 characters."""
+    return f"{float(value) + 0.0:.9g}"  # no -0.0
 
 
 def identifier(name: str) -> str:
@@ -250,7 +248,7 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
         estimates = np.diag(numbers(errors, (3, 3))[turn])
         named = ", ".join(f"k{i + 1}{i + 1} {error:.1e}" for i, error in enumerate(estimates))
         paragraphs.append(f"Estimated errors by the mesh: {named}.")
-    words = [number(value, 20) for value in values]
+    words = [*map(number, values)]
     if form in ("abaqus", "calculix"):
         keywords = [f"*MATERIAL, NAME={identifier(name)}", "*CONDUCTIVITY, TYPE=ORTHO"]
         return "\n".join([*comment_lines(paragraphs, "**"), *keywords, ", ".join(words)])
