@@ -136,10 +136,9 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         axial, transverse = numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
-    computed_errors = (document.get("mesh_error") or {}).get("constants", {})
+    known = (document.get("mesh_error") or {}).get("constants", {})
     cards = engineering_constants.ABOUT_FIBRES.items()
-    pairs = [(computed_errors[key], about.card) for key, about in cards if key in computed_errors]
-    errors = {name: float(error) for error, names in pairs for name in names}
+    errors = {name: float(known[key]) for key, about in cards if key in known for name in about.card}
     return _material(document, symmetry, compliance, expansion, errors)
 
 

@@ -94,8 +94,7 @@ def _data_lines(values: Iterable[float]) -> list[str]:
 def ansys(material: effective_material.EffectiveMaterial) -> str:
     """Return the ANSYS card.  Raises CaseError for an expansion with shears."""
     if material.expansion is not None and material.expansion[3:].any():
-        reason = "its thermal expansion has shears in its axes, for which ANSYS has no constants"
-        raise CaseError(f"{reason}; use --transversely-isotropic")
+        raise CaseError("its thermal expansion has shears in its axes, which ANSYS lacks; use --transversely-isotropic")
     lines = effective_material.comments(material, "!")
     lines.append("! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
     if material.is_orthotropic:
