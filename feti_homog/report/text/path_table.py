@@ -72,8 +72,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
-    if largest == landmarks.LARGEST and not at_end:
-        text += f"; {curve} ends near its peak, {fall:.1%} below it"
+    text += f"; {curve} ends near its peak, {fall:.1%} below it" * (largest == landmarks.LARGEST and not at_end)
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
