@@ -201,7 +201,7 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
     if OWN_COLOURS in cell.marks.values():
         cell.bar(grid[len(numbers) - 1], shapes[-1])
-    bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
+    bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.03)
     bar.locator = MaxNLocator(6)
     bar.ax.set_title("before" if OWN_COLOURS in cell.marks.values() else "")
     for axes in grid[len(numbers) :]:
