@@ -27,9 +27,8 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
     """Return the sorted tip directions in degrees by curve: fibre n from 0, or ~n for the curve within a coating."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
-        is_within = interface.between is not None and {phase_names.COATING, phase_names.MATRIX} & set(
-            interface.between
-        ) == {phase_names.COATING}
+        ends = {phase_names.COATING, phase_names.MATRIX} & {*(interface.between or ())}
+        is_within = ends == {phase_names.COATING}
         for fibre, directions in debonded_arcs.tips(interface.debonded, case.section.openings, fibres).items():
             by_curve.setdefault(~fibre if is_within else fibre, set()).update(directions)
     return {curve: sorted(by_curve[curve]) for curve in sorted(by_curve)}

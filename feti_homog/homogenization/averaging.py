@@ -143,9 +143,8 @@ class Homogenization:
         work = loads @ solver.condensed.energy @ loads + 2 * loads @ from_u
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
-        stress, star, (energy,) = np.split(
-            distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area, [len(loads), -1]
-        )
+        means = distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area
+        stress, star, (energy,) = np.split(means, [len(loads), -1])
         sides, stress = stress[len(strain) :], solver.closure.T @ stress
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (coupled_interfaces.slipped(self.interface, state) == 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials import engineering_constants, laws
-from feti_homog.mesh import Torus, submeshes
+from feti_homog.mesh import CoarseMesh, Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
@@ -39,8 +39,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
     """List faults in `between` of interfaces; in the cell, phases `first` (n,) touch phases `second` (n,)."""
-    lines = []
-    touching = np.zeros((len(phases), len(phases)), bool)
+    lines, touching = list[str](), np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
     for section, interface in interface_section.labelled(case.interfaces):
         if interface.between is None:
@@ -54,11 +53,14 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh, on ineffective interfaces, soft springs, and nodes that never part.
+    """List remarks on a mesh: polygons, interfaces without effect, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
+    lost = cut_off(torus.mesh, case.cell.refine) if case.cell.has_own_mesh and case.cell.order == 1 else 0.0
+    if lost > SAME_RATIO / 2:
+        lines.append(f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2")
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
     lines += soft_springs(case, radii)
@@ -80,6 +82,15 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
             "on interfaces; use a finer mesh"
         )
     return tuple(lines)
+
+
+def cut_off(mesh: CoarseMesh, refine: int) -> float:
+    """Return the fraction of round fibres that straight edges cut off after `refine` halvings; 0 without arcs."""
+    curves = mesh.ellipses[mesh.arc_circle]
+    ends = np.linalg.solve(curves.frames, (mesh.points[mesh.arc_edges] - curves.centres[:, None]).swapaxes(1, 2))
+    angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**refine
+    area = np.abs(np.linalg.det(curves.frames))
+    return 1.0 - float(area @ np.sin(angle)) / float(area @ angle) if len(angle) else 0.0
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:

@@ -98,9 +98,8 @@ class SharedVertices:
         `combine` takes the values and one number per row, equal for equal rows.  Results are split like `parts`.
         """
         comm, home = self._comm, rows[:, 1:].sum(axis=1) // 2 % self._comm.size
-        rows, values, source, position = distributed_arrays.exchange(
-            comm, home, rows, values, np.full(len(rows), comm.rank), np.arange(len(rows))
-        )
+        origin = np.full(len(rows), comm.rank), np.arange(len(rows))
+        rows, values, source, position = distributed_arrays.exchange(comm, home, rows, values, *origin)
         order = np.lexsort(rows.T)
         is_new = np.ones(len(order), bool)
         is_new[1:] = (np.diff(rows[order], axis=0) != 0).any(axis=1)

@@ -85,6 +85,11 @@ class CellSummary:
         """The coating thicknesses (fibres,), 0 without a coating, NaN if not round."""
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
+    @property
+    def has_corners(self) -> bool:
+        """Whether fibres may have corners: shapes other than circles and ellipses."""
+        return bool(np.isnan(self.frames[self.fibre_bodies]).any())
+
     def fibre_number(self, constituent: Int) -> Int:
         """Return the fibre numbers (k,) of the constituents with indices (k,)."""
         return np.asarray(self.numbers[constituent])

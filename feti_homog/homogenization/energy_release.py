@@ -222,9 +222,8 @@ class EnergyReleaseRates:
             debonded = (behind >= 0) & ((status[behind] != BONDED) | (behind == tips.node[t]))
             bonded = (front >= 0) & (status[front] == BONDED)
             # The first debonded nodes behind the tip, and the first bonded nodes ahead.
-            behind, front = (
-                chain[: np.argmin(np.append(mask, False))] for chain, mask in ((behind, debonded), (front, bonded))
-            )
+            behind = behind[: np.argmin(np.append(debonded, False))]
+            front = front[: np.argmin(np.append(bonded, False))]
             to_behind, to_front = (
                 np.linalg.norm(nearest_image(self.points[chain] - self.points[tips.node[t]], self._period), axis=1)
                 for chain in (behind, front)

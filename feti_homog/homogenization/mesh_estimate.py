@@ -99,7 +99,7 @@ def energy_errors(
         state = responses[0].state
         springs = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
         elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
-    is_uneven = _has_corners(cell) or (lattice.order == 2 and bool(cell.case.interfaces))
+    is_uneven = cell.summary.has_corners or (lattice.order == 2 and bool(cell.case.interfaces))
     smallest = LEAST_SHARE if is_uneven else LEAST_OF_TWO[lattice.order]
     # If faces touch at different positions in two responses, the energy is not bilinear: nothing cancels.
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, 1.0 if contact else smallest)
@@ -125,17 +125,12 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     lattice = cell.lattice
     pieces = (s.submesh for s in cell.subdomains)
     straight = any(bool((piece.at_void[piece.edge_class] & (piece.turns == 0)).any()) for piece in pieces)
-    if not lattice.halvings or _has_corners(cell) or cell.comm.allreduce(straight, MPI.LOR):
+    if not lattice.halvings or cell.summary.has_corners or cell.comm.allreduce(straight, MPI.LOR):
         return False
     if not cell.case.interfaces:
         return lattice.order == 2  # with linear elements both parts of the error cancel too often
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
-
-
-def _has_corners(cell: TornCell) -> bool:
-    """Return whether fibres may have corners: shapes other than circles and ellipses."""
-    return bool(np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any())
 
 
 def _recovered(

@@ -36,12 +36,10 @@ def problems(case: Case) -> tuple[Problem, ...]:
 def law(case: Case, phase: str, problem: Problem) -> Float:
     """Return the phase stiffness or conductivity A (v, v) for the loads of a problem."""
     material = case.material_of(phase)
-    if problem in (PLANE, CONDUCTION):
-        return (
-            laws.conductivity(material)
-            if problem == CONDUCTION
-            else laws.plane_stiffness(material, case.analysis.plane)
-        )
+    if problem == CONDUCTION:
+        return laws.conductivity(material)
+    if problem == PLANE:
+        return laws.plane_stiffness(material, case.analysis.plane)
     C = laws.spatial_stiffness(material)
     if problem == AXIAL:
         return C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
@@ -110,10 +108,9 @@ def springs(case: Case, problem: Problem = PLANE) -> jump_operator.InterfaceSpri
 
     The springs of conduction are conductances.  Missing stiffnesses are infinite.
     """
-    along = [
-        (bond.conductance or bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces
-    ]
-    around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces]
+    bonds = case.interfaces
+    along = [(bond.conductance or bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in bonds]
+    around = [(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in bonds]
     return jump_operator.InterfaceSprings(tuple(along if problem.components == 1 else around), has_softening(case))
 
 

@@ -113,10 +113,10 @@ def error_shares(cell: TornCell, response: Response) -> Float:
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
     """Name the places at which stresses of plane states would grow without limit on finer meshes."""
-    corners = np.isnan(cell.summary.frames[cell.summary.fibre_bodies]).any()
     rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
     tips = rigid and any(plane is not None and plane.debonded > 0 < plane.counts["bonded"] for plane in states)
-    return {name for name, exists in (("corners of fibres", corners), ("tips of debonding", tips)) if exists}
+    places = {"corners of fibres": cell.summary.has_corners, "tips of debonding": tips}
+    return {name for name, exists in places.items() if exists}
 
 
 def _stresses(

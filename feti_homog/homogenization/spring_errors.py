@@ -84,9 +84,7 @@ class SpringSides:
         holds = (status == BONDED) & (C > 0).all(axis=1)
         stiffness = 1 / (np.where(holds[:, None], C, 1.0) * nodes.length[:, None])
         state = status, holds, stiffness, force, force * C[:, :, None]
-        status, holds, stiffness, force, jump = (
-            np.concatenate(table) for table in zip(*self._comm.allgather(state), strict=True)
-        )
+        status, holds, stiffness, force, jump = map(np.concatenate, zip(*self._comm.allgather(state), strict=True))
         # The energy counts springs on the whole length of a tip node, but on the debonded side there are none.
         tips = self._chains.tips(status)
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]

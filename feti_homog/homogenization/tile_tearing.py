@@ -33,9 +33,8 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
         assert not isinstance(noded, CoarseMesh)
         return tear_by_tiles(case, noded, lattice, comm, policy)
     mesh = fill_tiles(noded, comm)
-    return distributed_arrays.scatter(
-        comm, mpi_errors.on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or []
-    )
+    shares = mpi_errors.on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
+    return distributed_arrays.scatter(comm, shares or [])
 
 
 def place_nodes(

@@ -216,8 +216,7 @@ def tear(
 
     with progress.stage("factor") as line:
         solver = solver_of(phase_laws.problems(case)[0], subdomains)
-        multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
-        line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
+        line.append(f"{solver.jump_operator.global_rows} multipliers, coarse dimension {solver.coarse_dimension}")
     cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell

@@ -23,9 +23,7 @@ RATIOS = ("nu_axial", "nu_transverse", "expansion_axial", "expansion_transverse"
 SECANTS = ("C11", "C33", "C44", "C66")  # of generalized plane strain where faces may touch: there are no constants
 CONDUCTION = ("k11", "k22", "k33")
 COMMON_PANELS = ("C11", "C66")  # of generalized plane strain and plane states together
-BANDS = {"C11": "Reuss to Voigt", "C33": "Reuss to Voigt"}
-BANDS |= dict.fromkeys(("bulk", "shear", *CONDUCTION), "Hashin-Shtrikman")
-BAND_SHADES = {"Reuss to Voigt": "0.92"}
+BOUNDS = dict.fromkeys(PANELS[:2], "Reuss and Voigt") | dict.fromkeys((*PANELS[2:], *CONDUCTION), "Hashin-Shtrikman")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 NAMES = {
     **{name: f"${name[0]}_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66", *CONDUCTION)},
@@ -66,11 +64,11 @@ def moduli_figure(table: SweepTable) -> Figure:
     picture = Figure(figsize=(7.2, 2.6 * rows + 0.8), layout="constrained")
     panels = picture.subplots(rows, 2, sharex=True, squeeze=False).ravel()
     for axes, name in zip(panels, names, strict=False):
-        for style, one_series in enumerate(series):
-            _plot_series(axes, table, one_series, name, style)
+        for number, one_series in enumerate(series):
+            _plot_series(axes, table, one_series, name, number)
         unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
         axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}\n{unit}".rstrip())
-        _limit(axes, BANDS.get(name) == "Reuss to Voigt")
+        _limit(axes)
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
     for axes in panels[len(names) :]:
@@ -83,12 +81,14 @@ def moduli_figure(table: SweepTable) -> Figure:
     return picture
 
 
-def _limit(axes: Axes, is_wide: bool) -> None:
-    """Limit the ordinate to the computed values and the bounds, without Reuss' and Voigt's bounds if `is_wide`."""
-    shapes = [shape for shape in axes.collections if not (is_wide and shape.get_label() == "Reuss to Voigt")]
-    corners = [np.asarray(path.vertices)[:, 1] for shape in shapes for path in shape.get_paths()]
-    values = np.concatenate([*(np.asarray(line.get_ydata(), float) for line in axes.lines), *corners])
-    low, high = np.nanmin(values), np.nanmax(values)
+def _limit(axes: Axes) -> None:
+    """Limit the ordinate to values with their errors, and to bounds up to half of that range away."""
+    values: list[Any] = [np.asarray(path.vertices)[:, 1] for shape in axes.collections for path in shape.get_paths()]
+    bounds = [line.get_ydata() for line in axes.lines if "bounds" in str(line.get_label())]
+    values += [line.get_ydata() for line in axes.lines if "bounds" not in str(line.get_label())]
+    low, high = np.nanmin(np.concatenate(values)), np.nanmax(np.concatenate(values))
+    ends = np.clip(np.concatenate([[low, high], *bounds]), 1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low)
+    low, high = np.nanmin(ends), np.nanmax(ends)
     margin = 0.06 * (high - low) or 0.06 * abs(high) or 1.0
     axes.set_ylim(low - margin, high + margin)
 
@@ -96,34 +96,33 @@ def _limit(axes: Axes, is_wide: bool) -> None:
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
     """Return the bounds of a result by panel.  Stiffnesses have Reuss' and Voigt's, constants tighter bounds."""
     bounds = document.get("bounds") or {}
-    pairs: dict[str, Any] = {
-        f"C{k + 1}{k + 1}": (bounds["reuss"][k][k], bounds["voigt"][k][k]) for k in (0, 2) if bounds
-    }
-    forms = document.get("conductivity_estimates") or {}
+    ends, forms = [bounds[name] for name in ("reuss", "voigt") if bounds], document.get("conductivity_estimates") or {}
+    pairs: dict[str, Any] = {f"C{k + 1}{k + 1}": tuple(end[k][k] for end in ends) for k in (0, 2) if ends}
     pairs |= dict.fromkeys(CONDUCTION[:2], forms.get("hashin_shtrikman"))
     pairs |= (bounds.get("hashin_shtrikman") or {}) | (document.get("fibre_bounds") or {})
     return {name: pair for name, pair in pairs.items() if pair is not None}
 
 
-def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int) -> None:
+def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, number: int) -> None:
     """Draw a series of one output.
 
     Faint marks are realisations, a line the means with their confidence intervals, wide pale bars the mean mesh errors,
-    and a grey band the bounds.
+    and dashes or dots the bounds.
     """
-    colour, marker = plot_helpers.INK[style], MARKERS[style]
+    colour, marker = plot_helpers.INK[number], MARKERS[number]
     statistics, values = table.statistics[name], table.outputs[name]
     numbers = [table.points.index(point) for point in series.points]
     for x, point in zip(series.x, series.points, strict=True):
         rows = table.rows(point)
         if len(rows) > 1:
-            faint: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
-            axes.plot([x] * len(rows), values[rows], marker, **faint, color=colour, label="realisations")
+            axes.plot(
+                [x] * len(rows), values[rows], marker, color=colour, ms=3.5, alpha=0.4, mew=0, label="realisations"
+            )
     limits = [[bounds_of(result).get(name, (np.nan, np.nan)) for result in table.results_of(p)] for p in series.points]
-    band = np.array([np.mean(pairs, axis=0) for pairs in limits])
-    if np.isfinite(band).any():
-        label = BANDS.get(name, "Hill, Hashin")
-        axes.fill_between(series.x, *band.T, color=BAND_SHADES.get(label, "0.82"), lw=0.0, zorder=0, label=label)
+    ends = np.array([np.mean(pairs, axis=0) for pairs in limits])
+    if np.isfinite(ends).any():
+        label, style = f"{BOUNDS.get(name, 'Hill and Hashin')} bounds", ":" if name in PANELS[:2] else "--"
+        axes.plot(series.x, ends, style, color=colour, linewidth=0.9, label=label)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.plot(series.x, mean, color=colour, marker=marker, markersize=3.5, linewidth=1.2, label=series.label or None)
     if spread.any():

@@ -26,8 +26,8 @@ ANSYS_TERMS = "D11 D21 D31 D41 D51 D61 D22 D32 D42 D52 D62 D33 D43 D53 D63 D44 D
 ANSYS_PAIRS = {"1": "11", "2": "22", "3": "33", "4": "12", "5": "23", "6": "13"}
 
 
-def read_abaqus(text: str) -> Card:
-    """Abaqus and CalculiX, whose shears of *EXPANSION, TYPE=ANISO are the tensor's."""
+def read_calculix(text: str) -> Card:
+    """Read a card whose shears of *EXPANSION, TYPE=ANISO are the tensor's."""
     blocks: dict[str, list[float]] = {}
     for line in text.splitlines():
         assert line.isascii() and len(line) <= 256
@@ -49,6 +49,14 @@ def read_abaqus(text: str) -> Card:
         a11, a22, a33, a12, a13, a23 = blocks["*EXPANSION, TYPE=ANISO"]
         return C, np.array([[a11, a12, a13], [a12, a22, a23], [a13, a23, a33]])
     return C, np.diag(blocks["*EXPANSION, TYPE=ORTHO"]) if "*EXPANSION, TYPE=ORTHO" in blocks else None
+
+
+def read_abaqus(text: str) -> Card:
+    """As for CalculiX, but Abaqus stores strains, thermal ones too, with engineering shears."""
+    C, alpha = read_calculix(text)
+    if alpha is not None:
+        alpha = np.diag(np.diag(alpha)) + (alpha - np.diag(np.diag(alpha))) / 2
+    return C, alpha
 
 
 def read_ansys(text: str) -> Card:
@@ -102,7 +110,7 @@ def read_csv(text: str) -> Card:
 
 
 READERS: dict[str, Callable[[str], Card]] = {
-    "abaqus": read_abaqus, "calculix": read_abaqus, "ansys": read_ansys, "moose": read_moose, "csv": read_csv,
+    "abaqus": read_abaqus, "calculix": read_calculix, "ansys": read_ansys, "moose": read_moose, "csv": read_csv,
 }  # fmt: skip
 
 

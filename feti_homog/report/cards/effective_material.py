@@ -135,10 +135,9 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         axial, transverse = numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
-    computed_errors = (document.get("mesh_error") or {}).get("constants", {})
+    known = (document.get("mesh_error") or {}).get("constants", {})
     cards = engineering_constants.ABOUT_FIBRES.items()
-    pairs = [(computed_errors[key], about.card) for key, about in cards if key in computed_errors]
-    errors = {name: float(error) for error, names in pairs for name in names}
+    errors = {name: float(known[key]) for key, about in cards if key in known for name in about.card}
     return _material(document, symmetry, compliance, expansion, errors)
 
 
@@ -208,11 +207,9 @@ def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
     return [f"{mark} {line}" for line in lines]
 
 
-def number(value: float, width: int = 24) -> str:
-    """Write a value in at most `width` characters, rounded if 17 digits do not fit.  `width` must be at least 12."""
-    value = float(value) + 0.0  # no -0.0
-    forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
-    return next(form for form in forms if len(form) <= width)
+def number(value: float) -> str:
+    """Write a value with nine significant digits, far below the mesh error, in at most 16 characters."""
+    return f"{float(value) + 0.0:.9g}"  # no -0.0
 
 
 def identifier(name: str) -> str:
@@ -249,7 +246,7 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
         estimates = np.diag(numbers(errors, (3, 3))[turn])
         named = ", ".join(f"k{i + 1}{i + 1} {error:.1e}" for i, error in enumerate(estimates))
         paragraphs.append(f"Estimated errors by the mesh: {named}.")
-    words = [number(value, 20) for value in values]
+    words = [*map(number, values)]
     if form in ("abaqus", "calculix"):
         keywords = [f"*MATERIAL, NAME={identifier(name)}", "*CONDUCTIVITY, TYPE=ORTHO"]
         return "\n".join([*comment_lines(paragraphs, "**"), *keywords, ", ".join(words)])

@@ -2,7 +2,8 @@
 
 Abaqus Keywords Guide, *ELASTIC and *EXPANSION: engineering constants are E1, E2, E3, nu12, nu13, nu23, G12, G13 and, on
 the next line, G23, where nu_ij is the strain along j under stress along i; TYPE=ANISOTROPIC takes the 21 entries
-D_ijkl of `ABAQUS_ENTRIES`, eight to a line.  Numbers have up to 20 characters (Input syntax rules).
+D_ijkl of `ABAQUS_ENTRIES`, eight to a line.  TYPE=ANISO takes alpha11, alpha22, alpha33, alpha12, alpha13, alpha23,
+thermal strains per unit of temperature as Abaqus stores strains: with engineering shears (Conventions).
 
 CalculiX CrunchiX user's manual, *ELASTIC and *EXPANSION; fields of 20 characters are read.  Its alpha12, alpha13,
 alpha23 are the tensor's shears, half the engineering shears.
@@ -25,10 +26,10 @@ from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.cards import effective_material
 from feti_homog.results import output_folder, result_json
-from feti_homog.typing import Document
+from feti_homog.typing import Document, Float
 
-FIELD, FIELDS = 20, 8  # in Abaqus: characters of a number, numbers in a line
-TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+FIELDS = 8  # numbers in a line of Abaqus
+ENGINEERING_SHEARS, TENSOR_SHEARS = np.ones(6), np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
 ABAQUS_ORDER = [voigt.SPATIAL_STRESSES.index(name) for name in ("S11", "S22", "S33", "S12", "S13", "S23")]
 """The indices in [11, 22, 33, 23, 13, 12] of the components in Abaqus' order."""
 ABAQUS_ENTRIES = tuple((ABAQUS_ORDER[row], ABAQUS_ORDER[column]) for column in range(6) for row in range(column + 1))
@@ -49,28 +50,20 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
 def abaqus(material: effective_material.EffectiveMaterial) -> str:
-    """Return the Abaqus card.  Raises CaseError for an expansion with shears."""
-    # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering shear.
-    _refuse_shears(material, "which cards for Abaqus do not carry")
-    return _keyword_card(material, "ANISOTROPIC")
+    """Return the Abaqus card."""
+    return _keyword_card(material, "ANISOTROPIC", ENGINEERING_SHEARS)
 
 
 def calculix(material: effective_material.EffectiveMaterial) -> str:
     """Return the CalculiX card; an anisotropic material has TYPE=ANISO."""
-    return _keyword_card(material, "ANISO")
+    return _keyword_card(material, "ANISO", TENSOR_SHEARS)
 
 
-def _refuse_shears(material: effective_material.EffectiveMaterial, reason: str) -> None:
-    """Raise CaseError for an expansion with shears, for which a format has no place."""
-    if material.expansion is not None and material.expansion[3:].any():
-        advice = "use --transversely-isotropic"
-        raise CaseError(f"its thermal expansion has shears in its axes, {reason}; {advice}")
-
-
-def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: str) -> str:
+def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: str, shears: Float) -> str:
     """Return the card of the keywords *MATERIAL, *ELASTIC and *EXPANSION.
 
-    An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.
+    An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.  `shears` (6,)
+    multiplies the strains with engineering shears.
     """
     lines = effective_material.comments(material, "**")
     lines.append(f"*MATERIAL, NAME={effective_material.identifier(material.name)}")
@@ -85,21 +78,23 @@ def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: s
         lines += [f"** {', '.join(names[k : k + FIELDS])}" for k in range(0, len(names), FIELDS)]
         lines += _data_lines(C[i, j] for i, j in ABAQUS_ENTRIES)
     if (alpha := material.expansion) is not None:
-        has_shears = alpha[3:].any()
+        has_shears, kind = alpha[3:].any(), "the tensor's" if shears is TENSOR_SHEARS else "engineering"
         lines += [f"*EXPANSION, TYPE={'ANISO' if has_shears else 'ORTHO'}"]
-        lines += _data_lines((alpha * TENSOR_SHEARS)[ABAQUS_ORDER] if has_shears else alpha[:3])
+        lines += [f"** alpha11, alpha22, alpha33, alpha12, alpha13, alpha23; {kind} shears"] * bool(has_shears)
+        lines += _data_lines((alpha * shears)[ABAQUS_ORDER] if has_shears else alpha[:3])
     return "\n".join(lines)
 
 
 def _data_lines(values: Iterable[float]) -> list[str]:
     """Write the values as card lines of eight numbers, separated by commas."""
-    fields = [effective_material.number(value, FIELD) for value in values]
+    fields = [*map(effective_material.number, values)]
     return [", ".join(fields[k : k + FIELDS]) for k in range(0, len(fields), FIELDS)]
 
 
 def ansys(material: effective_material.EffectiveMaterial) -> str:
     """Return the ANSYS card.  Raises CaseError for an expansion with shears."""
-    _refuse_shears(material, "for which ANSYS has no constants")
+    if material.expansion is not None and material.expansion[3:].any():
+        raise CaseError("its thermal expansion has shears in its axes, which ANSYS lacks; use --transversely-isotropic")
     lines = effective_material.comments(material, "!")
     lines.append("! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
     if material.is_orthotropic:

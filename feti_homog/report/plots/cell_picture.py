@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
+from feti_homog.report.text.tables import with_micro
 from feti_homog.typing import Array, Document
 
 IN_LEGEND = 10  # most phases or parts in the legend, which would otherwise cover the cell
@@ -29,7 +30,7 @@ TURN = 0.618  # golden section: as a fraction of the colour circle, it never rep
 LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
-CUT = "#B00000"  # colour of cuts within bodies
+CUT = "#B00000"  # colour of cuts within bodies, and of debonded arcs
 FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours show nothing
 
 
@@ -54,9 +55,14 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     # Legends leave out labels that begin with "_".
     labels = [f" {name}" if name.startswith("_") else name for name in phases]
     entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=labels[k]) for k in present[:IN_LEGEND]]
+    arcs = list[Line2D]()
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
-    plot_helpers.legend_below(picture, entries, 3)
+    state = cell.file.get("state/0")  # before the load breaks bonds
+    if state is not None and (edges := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
+        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[edges]], CUT, 2.4, "round")
+        arcs = [Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded")]
+    plot_helpers.legend_below(picture, [*entries, *arcs], 4)
     return picture
 
 
@@ -225,7 +231,7 @@ def deformed(
         line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
     elif is_axial(state):
         step = draw_levels(axes, state, drawn)
-        caption = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
+        caption = f"$u_3$ every {step:g} {plot_helpers.plain(with_micro(attributes['length_unit']))}".rstrip()
         line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
     else:
         outline: Array = drawn.points[cell.borders]

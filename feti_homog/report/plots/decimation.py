@@ -76,9 +76,7 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
     labels = {
         name: np.repeat(_blocks(file[f"mesh/{name}"], group, block, lambda rows: rows[:, 0]), pieces)
         for name in ("body", "subdomain", "rank", "phase")
-        if f"mesh/{name}" in file
     }
-    labels.setdefault("rank", np.zeros_like(labels["body"]))  # older files have no ranks
     points = _picked(file["mesh/points"], nodes, block)
     return DrawnMesh(block, group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
 
@@ -148,8 +146,8 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     shear = 0.5 * loads["gamma12"]
     x = drawn.points - drawn.points.min(axis=0)  # else a factor would move the picture of a cell far from the origin
     fluctuation = displacement - x @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
-    areas = _determinant(_sides(drawn.points, drawn))
-    return np.asarray(displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas))
+    means = fluctuation[drawn.triangles].mean(axis=1)
+    return np.asarray(displacement - np.average(means, axis=0, weights=drawn.areas))
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:

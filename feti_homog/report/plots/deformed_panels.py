@@ -24,7 +24,7 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, field_file, field_guard, landmarks
 from feti_homog.typing import Array, Document
 
-MAX_PANELS = 6
+MAX_PANELS, MAX_ANGLES = 6, 9
 OWN_COLOURS = "end, own colours"
 MAX_FRAMES, FRAME_TIME = 24, 250  # frames of the animation; milliseconds per frame
 PANEL_LIMIT = 30_000  # triangles in a panel
@@ -78,6 +78,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
+        norm = Normalize(norm.vmin, norm.vmax)  # a shared one would call the artists of earlier frames
         attributes = state.attrs
         stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
         mark = self.marks.get(attributes["point"])
@@ -91,16 +92,17 @@ class DeformedCell(drawn_cell.DrawnCell):
         axes.set_axis_off()
         # Letters are about half of the font size wide; a panel is a quarter wider than its axes before the layout.
         letters = int(180.0 * axes.bbox.width / axes.figure.dpi / float(axes.title.get_fontsize()))
-        title = f"{mark}: {attributes['label']}" if mark else attributes["label"]
+        label = attributes["label"].replace(" deg", "°")
+        title = f"{mark}: {label}" if mark else label
         if mark and len(title) > letters:
-            title = f"{fill(mark, letters)}:\n{attributes['label']}"
+            title = f"{fill(mark, letters)}:\n{label}"
         load = self.labels.label(attributes, 2) if letters > 30 else self.labels.words(attributes)[0]
         axes.set_title(f"{title}\n{load}", y=1.0)
         return shapes
 
     def bar(self, axes: Axes, shapes: Any) -> None:
         """Draw the colour bar of the shapes beside the axes.  If there are two bars, both have titles."""
-        is_common = shapes.norm is self.colours[0]
+        is_common = shapes.get_clim() == (self.colours[0].vmin, self.colours[0].vmax)
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
         bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")
         bar.locator = MaxNLocator(6)
@@ -172,11 +174,12 @@ def shown_scale(file: Any, document: Document) -> float:
 def shown_states(document: Document, most: int, count: int) -> list[int]:
     """Choose at most `most` of the `count` states for the pictures.
 
-    The states are at the path landmarks, or else evenly spaced.
+    The states are at the path landmarks, or else evenly spaced, with equal steps if `count` allows.
     """
     if reported(document).is_followed:
         return landmarks.chosen_states(document, most, count)
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
+    even = (parts for parts in range(min(most, count) - 1, 2, -1) if (count - 1) % parts == 0)
+    return sorted({round(k) for k in np.linspace(0, count - 1, next(even, most - 1) + 1)})
 
 
 def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
@@ -186,27 +189,28 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)
     else:  # the first unit load, if an angle has several
         every = range(0, count, count // len(document[analysis.name]) or 1)
-        numbers = [every[k] for k in shown_states(document, MAX_PANELS, len(every))]
+        numbers = [every[k] for k in shown_states(document, MAX_ANGLES, len(every))]
     cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
     height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # with room for a colour bar and a title
-    figure = look.figure(WIDTH, rows * height + 0.7)
+    figure = look.figure(WIDTH, rows * height + 0.7, "compressed")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
-    if shapes[-1].norm is not cell.colours[0]:
+    if OWN_COLOURS in cell.marks.values():
         cell.bar(grid[len(numbers) - 1], shapes[-1])
-    bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
+    bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.03)
     bar.locator = MaxNLocator(6)
+    bar.ax.set_title("before" if OWN_COLOURS in cell.marks.values() else "")
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
     figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "))
     states = [cell.interface.state(drawn_cell.states_of_nodes(cell.state(number))) for number in numbers]
     present = np.unique(np.concatenate(states))
-    handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in present])
-    plot_helpers.legend_below(figure, handles)
+    plot_helpers.legend_below(figure, drawn_cell.state_legend([k for k in drawn_cell.STATE_NAMES if k in present]))
+    figure.draw_without_rendering()  # the layout settles at the second drawing
     return figure
 
 
@@ -225,8 +229,9 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
     The grid is about square and has few empty positions.
     """
     ideal = min(math.sqrt(0.7 * panels * ratio), panels)
-    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(ideal)), math.ceil(ideal)}]
-    grids = [grid for grid in grids if grid[1] <= 3] or grids
+    most = 3 if panels <= MAX_PANELS else 4
+    choices = {max(1, math.floor(ideal)), math.ceil(ideal), -(-panels // most)}
+    grids = [(rows, columns) for rows in choices if (columns := -(-panels // rows)) <= most]
     return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 

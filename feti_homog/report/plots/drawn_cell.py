@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -21,17 +20,8 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
-
-class NodeState(IntEnum):
-    """The state of an interface node: status in result.h5, or DAMAGED for unbroken damaged bonds."""
-
-    BONDED = 0
-    CLOSED = 1
-    OPEN = 2
-    DAMAGED = 3
-
-
-BONDED, CLOSED, OPEN, DAMAGED = NodeState
+# States of an interface node: the status in result.h5, or DAMAGED for a damaged bond that holds.
+BONDED, CLOSED, OPEN, DAMAGED = range(4)
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
 STATE_COLOURS = {BONDED: "black", CLOSED: "#E69F00", OPEN: "#0072B2"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
@@ -118,7 +108,7 @@ def damage_colour(damage: float) -> Any:
     return mpl.colormaps["BuPu"](0.35 + 0.65 * damage)
 
 
-def state_legend(kinds: Collection[NodeState]) -> list[Line2D]:
+def state_legend(kinds: Collection[int]) -> list[Line2D]:
     """Return legend lines of interface states, with lines for three damage values."""
     lines = [(STATE_NAMES[k], STATE_COLOURS[k], STATE_WIDTHS[k]) for k in kinds if k != DAMAGED]
     if DAMAGED in kinds:

@@ -61,9 +61,10 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
     curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
+    largest = landmarks.name_of(document, peak).replace(landmarks.LARGEST, f"{landmarks.LARGEST}, no peak yet,")
     for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
-        names = [title.replace("_", " ").strip() or landmarks.name_of(document, peak) for title in titles]
+        names = [title.replace("_", " ").strip() or largest for title in titles]
         bond = "" if narrow else landmarks.bond_of(peak, titles[-1]).replace(" degrees", "°")
         label = f"{' and '.join(names)} {peak[f'{titles[-1]}stress']:.4g} {unit}".rstrip() + f"\n{bond}".rstrip()
         place = peak[f"{titles[-1]}strain"], peak[f"{titles[-1]}stress"]
@@ -134,6 +135,7 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
         damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]
         axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged, by length")
     axes.set_ylabel("interface\nnodes")
+    axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
 
 
 def _records(document: Document) -> Array | None:

@@ -22,6 +22,7 @@ from feti_homog.case import bond_laws
 from feti_homog.errors import escaped
 from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
+from feti_homog.report.text.tables import with_micro
 from feti_homog.results import atomic, path_curves
 from feti_homog.typing import Array, Document
 
@@ -255,7 +256,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
 def bond_limits(case: Document) -> list[str]:
     """Describe every interface law in one line.  With several laws, the lines begin with the phases."""
     bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
-    stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
+    stress, length = (with_micro(output.get(name, "")) for name in ("stress_unit", "length_unit"))
     units = stress, f"{stress} {length}" if stress and length else ""
     if len(bonds) == 1:
         return [_limits(bonds[0], units)]
@@ -278,7 +279,7 @@ def plain(text: str) -> str:
 
 
 def unit_label(label: str) -> str:
-    return f"({plain(label)})" if label else ""
+    return f"({plain(with_micro(label))})" if label else ""
 
 
 def stress_label(label: str) -> str:

@@ -109,16 +109,17 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
 def thermal(document: Document) -> list[Table]:
     """Return a list with the table of thermal constants; [] without any.  Rows are components, columns quantities."""
     present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
-    names = [stress[1:] for stress in voigt.SPATIAL_STRESSES]
-    errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
-    values = [np.array(document[key], float) for key in present]
-    rounded = [np.where(np.abs(v) > 10.0**-7 * np.abs(v).max(), v, 0.0).tolist() for v in values]
-    rows = list(zip(names, *rounded, *errors.values(), strict=True))
-    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
-    columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
+    columns, entries = [Column("", -6)], [[stress[1:] for stress in voigt.SPATIAL_STRESSES]]
+    for key, title in present.items():
+        values = np.array(document[key], float)
+        columns.append(Column(title, 22, ".7g"))
+        entries.append(np.where(np.abs(values) > 10.0**-7 * np.abs(values).max(), values, 0.0).tolist())
+        if _errors(document).get(key) is not None:
+            columns.append(Column("mesh error", 14, ".1e"))
+            entries.append(_errors(document)[key])
     unit = f"; stresses{label}" if (label := stress_label(document)) else ""
     title = f"Per unit of temperature, {engineering_constants.CELL_AXES}{unit}"
-    return [Table(title, columns, rows)] if present else []
+    return [Table(title, columns, [*zip(*entries, strict=True)])] if present else []
 
 
 def moduli(document: Document) -> Table:

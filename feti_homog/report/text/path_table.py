@@ -54,8 +54,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
     largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
     noun = document["case"]["path"]["method"].removesuffix("s")
-    begins = {landmarks.PEAK: f"Peak {name}", landmarks.LARGEST: f"Largest {name}"}
-    text = begins.get(largest, f"Largest {name} so far, the path being cut off")
+    leg_of, fall = path_curves.legs_of(document), landmarks.fall_of(document, peak)
+    curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
+    at_end = peak["event"] == np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
+    begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
+    text = begins.get(largest, f"{name} at the end of {curve}, no peak yet" if at_end else f"Largest {name}")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
     text += f" ({_place(peak, '', noun)})"
     for title in ("first_softening_", "first_break_"):
@@ -70,11 +73,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
-    if largest == landmarks.LARGEST:
-        leg_of, fall = path_curves.legs_of(document), landmarks.fall_of(document, peak)
-        at_end = peak["event"] == np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
-        curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
-        text += f"; {curve} ends {'there' if at_end else f'near its peak, {fall:.1%} below it'}"
+    text += f"; {curve} ends near its peak, {fall:.1%} below it" * (largest == landmarks.LARGEST and not at_end)
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]

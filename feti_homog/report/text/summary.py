@@ -12,7 +12,7 @@ from typing import Any
 
 from feti_homog.materials import voigt
 from feti_homog.report.text import constant_tables
-from feti_homog.report.text.tables import ERROR, UNKNOWN, WIDTH, Column, Table, stress_label, without_noise
+from feti_homog.report.text.tables import ERROR, UNKNOWN, WIDTH, Column, Table, stress_label, with_micro, without_noise
 from feti_homog.typing import Document
 
 LABEL = 12  # characters of the labels at the left
@@ -155,7 +155,7 @@ def _joined(blocks: Iterable[Sequence[str]]) -> str:
 
 def _cell(document: Document) -> list[str]:
     cell, case = document["cell"], document["case"]
-    unit = case.get("output", {}).get("length_unit", "")
+    unit = with_micro(case.get("output", {}).get("length_unit", ""))
     size = f"{cell['width']:.6g} x {cell['height']:.6g} {unit}".rstrip()
     shape, fractions = case["cell"], cell.get("fractions", {})
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())

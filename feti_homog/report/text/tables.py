@@ -39,7 +39,12 @@ def with_unit(name: str, stress_unit: str) -> str:
 
 def in_brackets(unit: str) -> str:
     """Put a unit in brackets, after a space; empty without a unit."""
-    return f" ({unit})" if unit else ""
+    return f" ({with_micro(unit)})" if unit else ""
+
+
+def with_micro(unit: str) -> str:
+    """Write "um" in a unit with the micro sign."""
+    return re.sub(r"\bum(?![A-Za-z])", "\N{MICRO SIGN}m", unit)
 
 
 def stress_label(document: Document) -> str:

@@ -170,3 +170,23 @@ def test_another_number_of_subdomains_than_asked_for_is_remarked(asked, words):
 def test_only_moves_beyond_rounding_are_warnings(moved: float, warns: int, unit: float) -> None:
     summary: Any = SimpleNamespace(snapped=moved * unit, width=2.0 * unit, height=unit)
     assert len(CellSummary.warnings(summary)) == warns
+
+
+@pytest.mark.parametrize(("name", "more"), [("hexagonal", {}), ("two_fibres", {}), ("hexagonal", {"refine": 1}),
+                                            ("two_fibres", {"order": 2})])  # fmt: skip
+def test_straight_edges_of_a_users_mesh_have_the_remark_of_generated_cells(name, more):
+    """The areas of the circles and ellipses that the result names, less those of the meshed fibres."""
+    phase = {"young": 3.0, "poisson": 0.3}
+    case = {
+        "cell": {"geometry": "mesh", "file": f"{name}.msh"} | more,
+        "material": dict.fromkeys(["matrix", "fibre"], phase),
+    }
+    case["material"] |= {"fibre:2": phase} if name == "two_fibres" else {}
+    case["analysis"] = {"type": "stiffness", "plane": "strain"}
+    result = run(Case.parse(case, ROOT / "meshes"))
+    axes = [(f.radius, f.radius) if f.semi_axes is None else f.semi_axes for f in result.fibres]
+    round_fraction = sum(np.pi * a * b for a, b in axes) / result.cell.area
+    lost = 1.0 - result.cell.fibre_fraction / round_fraction
+    assert (lost > 0.005) == (not more)
+    text = f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2"
+    assert [remark for remark in result.remarks if "order" in remark] == [text] * (not more)

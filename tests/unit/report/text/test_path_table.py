@@ -47,7 +47,7 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
         ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2)", "peak"),
         ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2); later up to 90 "
          "(increment 3)", "peak"),
-        ([10, 20, 30], 0, "Largest S11: 30 at", " (increment 2); the path ends there", "largest stress and end"),
+        ([10, 20, 30], 0, "S11 at the end of the path, no peak yet: 30 at", "(increment 2)", "largest stress and end"),
         ([10, 30, -30], 0, "Peak S11: 30 at", "E11 = 0.00666667 (increment 1)", "peak"),
     ],
 )  # fmt: skip

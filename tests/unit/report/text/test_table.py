@@ -1,9 +1,11 @@
 """Tables as text and HTML: of points, envelopes and angles, and of constants in space."""
 
+import re
 from typing import Any
 
 import pytest
 
+from feti_homog.report.text import constant_tables
 from feti_homog.report.text.constant_tables import cell_constants, moduli, stiffnesses
 from feti_homog.report.text.point_tables import angle_table, components, envelope_table
 from feti_homog.report.text.tables import Column, Table
@@ -136,3 +138,13 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
 def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
     (table,) = cell_constants({"case": {}, "transversely_isotropic": CELL, **more})
     assert table.lines[-1] == f"  closed-form estimates exist for {words} only"
+
+
+def test_heads_of_thermal_constants_stand_apart() -> None:
+    """Stresses of both signs with errors: each head is a word of its own, and each error beside its constant."""
+    values = {name: [k + 1.0] * 6 for k, name in enumerate(constant_tables.THERMAL)}
+    errors = {name: [0.1 * (k + 1)] * 6 for k, name in enumerate(constant_tables.THERMAL)}
+    (table,) = constant_tables.thermal({"case": {}, "mesh_error": errors} | values)
+    heads = [head for title in constant_tables.THERMAL.values() for head in (title, "mesh error")]
+    assert re.split(r" {2,}", table.lines[1].strip()) == heads
+    assert table.cells[0] == ["11", "1", "1.0e-01", "2", "2.0e-01", "3", "3.0e-01"]

@@ -9,6 +9,7 @@ from scipy import stats
 from support.sweep_tables import collected, document, path_document
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
+from feti_homog.report.plots import plot_helpers
 from feti_homog.report.text.tables import unit, with_unit
 from feti_homog.studies import case_folders, collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
@@ -212,9 +213,9 @@ def test_bands_are_the_mean_bounds_in_the_results():
         each["fibre_bounds"] = {"E_axial": [low, 2 * low], "nu_axial": None}
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
     axes = pictures.moduli_figure(table).axes
-    bands = [[band for band in panel.collections if band.get_label() == "Hill, Hashin"] for panel in axes]
-    assert [len(each) for each in bands[:4]] == [1, 0, 0, 0]
-    assert {*map(tuple, bands[0][0].get_paths()[0].vertices)} == {(0.2, 2.0), (0.2, 4.0), (0.4, 4.0), (0.4, 8.0)}
+    ends = [[line for line in panel.lines if line.get_label() == "Hill and Hashin bounds"] for panel in axes]
+    assert [len(each) for each in ends[:4]] == [2, 0, 0, 0]
+    assert [line.get_xydata().tolist() for line in ends[0]] == [[[0.2, 2.0], [0.4, 4.0]], [[0.2, 4.0], [0.4, 8.0]]]
     sides = {
         "reuss": np.eye(3),
         "voigt": 2 * np.eye(3),
@@ -222,6 +223,21 @@ def test_bands_are_the_mean_bounds_in_the_results():
     }
     found = {"C11": (1.0, 2.0), "C33": (1.0, 2.0), "bulk": [1.25, 1.5], "shear": [0.5, 0.75]}
     assert pictures.bounds_of({"bounds": sides}) == found and pictures.bounds_of({"bounds": None}) == {}
+
+
+def test_bounds_have_the_colours_of_their_lines_and_leave_the_lines_high():
+    """Bounds far above the values are cut off at half of the range of the values; near bounds are not."""
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.4, 0.2, 0.4)]
+    keys = {"cell.fibre_fraction": [0.2, 0.4] * 2, "material.fibre.young": [70.0, 70.0, 200.0, 200.0]}
+    for each, size in zip(documents, (10.0, 20.0, 11.0, 21.0), strict=True):
+        each["transversely_isotropic"] = dict.fromkeys(each["transversely_isotropic"], size)
+        each["fibre_bounds"] = {"E_axial": [size - 1.0, size + 2.0], "G_axial": [size, 1000.0]}
+    several = pictures.moduli_figure(collected(keys, documents, [1, 2, 3, 4], [1] * 4)).axes
+    ends = [line for line in several[0].lines if line.get_label() == "Hill and Hashin bounds"]
+    assert [line.get_color() for line in ends] == [ink for ink in plot_helpers.INK[:2] for _ in range(2)]
+    assert [line.get_ydata().tolist() for line in ends] == [[9.0, 19.0], [12.0, 22.0], [10.0, 20.0], [13.0, 23.0]]
+    assert several[0].get_ylim() == pytest.approx((9.0 - 0.06 * 14.0, 23.0 + 0.06 * 14.0))
+    assert several[2].get_ylim() == pytest.approx((10.0 - 0.06 * 16.5, 26.5 + 0.06 * 16.5))
 
 
 def test_secants_in_space_are_drawn_without_bounds(tmp_path):

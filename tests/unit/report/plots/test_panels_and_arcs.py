@@ -1,0 +1,108 @@
+"""Panels of states: evenly spaced angles, titles apart, colours of their own; debonded arcs in cell.png; units."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.patches import PathPatch
+from support.sample_output import Sample, sample
+
+from feti_homog.report.plots import cell_picture, deformed_panels, drawn_cell, plot_helpers
+from feti_homog.report.text import tables
+from feti_homog.results.field_file import FieldFile
+
+COUNTS = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
+POINTS = [COUNTS | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in (0.5, 0.2, 1.0)]
+PATH = {
+    "case": {
+        "name": "a path",
+        "analysis": {"type": "path", "plane": "strain"},
+        "path": {"strain": [1.0, 0.0, 0.0], "method": "events"},
+        "output": {"stress_unit": "MPa"},
+    },
+    "path": POINTS,
+}
+
+
+def written(directory: Path, whole: Sample) -> Path:
+    from mpi4py import MPI
+
+    *parts, states = vars(whole).values()
+    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
+        for k, state in enumerate(states):
+            file.write_state(k, state)
+    return directory / "result.h5"
+
+
+@pytest.mark.parametrize(("last", "count"), [(180, 7), (180, 13), (360, 7), (180, 19), (180, 37), (180, 5), (90, 3)])
+def test_angles_in_panels_are_evenly_spaced_and_have_the_middle(last: int, count: int) -> None:
+    angles = np.linspace(0, last, count)
+    numbers = deformed_panels.shown_states({"angle": [{}] * count}, deformed_panels.MAX_ANGLES, count)
+    shown = angles[numbers]
+    assert 3 <= len(shown) <= deformed_panels.MAX_ANGLES and {0, last / 2, last} <= {*shown}
+    assert np.ptp(np.diff(shown)) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 12, 1000])
+def test_other_numbers_of_angles_have_panels_too(count: int) -> None:
+    numbers = deformed_panels.shown_states({"angle": [{}] * count}, deformed_panels.MAX_ANGLES, count)
+    assert (numbers[0], numbers[-1]) == (0, count - 1) and len(numbers) >= min(count, 4)
+
+
+@pytest.mark.parametrize("lines", [1, 2, 4])
+def test_titles_of_panels_leave_the_title_of_the_figure_free(tmp_path: Path, monkeypatch: Any, lines: int) -> None:
+    monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda _: dict.fromkeys(range(3), "peak\n" * lines))
+    with h5py.File(written(tmp_path, sample(4))) as file:
+        figure = deformed_panels.panels(file, json.loads(json.dumps(PATH)), 1.0)
+        (canvas := FigureCanvasAgg(figure)).draw()
+        renderer: Any = canvas.get_renderer()
+        title = figure._suptitle.get_window_extent(renderer)  # type: ignore[attr-defined]
+        boxes = [axes.title.get_window_extent(renderer) for axes in figure.axes if axes.get_title()]
+    assert len(boxes) >= 3 and not any(title.overlaps(box) for box in boxes)
+
+
+def test_drawings_leave_the_common_colours_without_listeners(tmp_path: Path) -> None:
+    """Frames of an animation come and go; the colours that they share outlive them."""
+    with h5py.File(written(tmp_path, sample(4))) as file:
+        cell = deformed_panels.DeformedCell.of_states(file, range(3), PATH, 1.0, 10_000)
+        axes = plot_helpers.PLAIN.figure(4.0, 4.0).subplots()
+        shapes = cell.draw(axes, 0, cell.moved(0))
+        cell.bar(axes, shapes)
+        assert shapes.get_clim() == (cell.colours[0].vmin, cell.colours[0].vmax)
+        assert not cell.colours[0].callbacks.callbacks
+
+
+@pytest.mark.parametrize("debonded", [False, True])
+def test_the_cell_shows_arcs_that_are_debonded_before_the_load(tmp_path: Path, debonded: bool) -> None:
+    whole = sample(8)
+    some = np.arange(len(whole.states[0].status)) < 3
+    initial = np.where(some, drawn_cell.CLOSED, drawn_cell.BONDED) * debonded
+    states = replace(whole.states[0], status=initial), *whole.states[1:]  # breaks under the load do not count
+    with h5py.File(written(tmp_path, replace(whole, states=states))) as file:
+        cell = drawn_cell.DrawnCell.of(file)
+        figure = cell_picture.figure(cell)
+        nodes = np.isin(cell.interface.nodes, np.flatnonzero(some)).any(axis=1)
+        expected = cell.drawn.points[cell.interface.edges[nodes]].reshape(-1, 2)
+    words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert words == ["matrix", "fibre", *["initially debonded"] * debonded]
+    lines = [line for line in figure.axes[0].patches if isinstance(line, PathPatch)]
+    red = [line for line in lines if line.get_edgecolor()[:3] == pytest.approx((0xB0 / 0xFF, 0.0, 0.0))]
+    assert len(red) == debonded
+    for line in red:
+        np.testing.assert_array_equal(line.get_path().vertices, expected)
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [("um", "µm"), ("MPa um", "MPa µm"), ("MPa/um", "MPa/µm"), ("um2", "µm2"), ("µm", "µm"), ("umol", "umol"),
+     ("mm", "mm"), ("vacuum", "vacuum"), ("", "")],
+)  # fmt: skip
+def test_micrometres_have_the_micro_sign(given: str, shown: str) -> None:
+    assert tables.with_micro(given) == shown
+    assert plot_helpers.unit_label(given) == (f"({shown})" if given else "")
+    assert tables.in_brackets(given) == (f" ({shown})" if given else "")
