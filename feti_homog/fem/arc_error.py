@@ -71,11 +71,6 @@ class ArcSides:
         at_void = np.concatenate([submesh.at_void[submesh.edge_class] for submesh in submeshes])
         return cls(element, side, nodes, points, normals, area, at_void[edge])
 
-    @property
-    def ends(self) -> Int:
-        """Return the element corners (f, 2), 0 to 2, at which the sides start and end."""
-        return np.stack([self.side, (self.side + 1) % 3], axis=1)
-
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.

@@ -72,8 +72,18 @@ def assemble(
         # sum_k int dN/dx_k L[(i,k), :]
         Q += (slope @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
         slopes += slope
-    # K is the sum of the couples (t, p, c^2) between the classes `rows` and `columns` (t, p).
-    rows, columns = classes[:, macro.rows], classes[:, macro.columns]
+    find = _pattern if len(classes) < ELEMENTS_AT_ONCE else _pattern.__wrapped__  # the cache keeps no large pattern
+    sums, columns, begin = find(classes.tobytes(), n, mesh.lattice)
+    blocks = (sums @ couples.reshape(-1, c * c)).reshape(-1, c, c)
+    K = bsr_matrix((blocks, columns, begin), shape=(c * n,) * 2).tocsr()
+    return Assembly(K, Q, slopes, areas)
+
+
+@lru_cache(maxsize=16)  # pieces of a label image have few different classes
+def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
+    """Find the sums of couples (t p) that are blocks of K, their columns, and the first of each row."""
+    of_triangle, macro = np.frombuffer(classes, np.int32).reshape(-1, len(lattice.nodes)), MacroElement.of(lattice)
+    rows, columns = of_triangle[:, macro.rows], of_triangle[:, macro.columns]
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()
     pattern = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n, n))
     pattern.sort_indices()
@@ -81,10 +91,7 @@ def assemble(
     is_first[pattern.indptr[:-1]] = True  # every class has couples
     first = np.flatnonzero(is_first)
     sums = csr_matrix((np.ones(rows.size), pattern.data, np.append(first, rows.size)), shape=(len(first), rows.size))
-    blocks = (sums @ couples.reshape(rows.size, c * c)).reshape(-1, c, c)
-    begin = np.searchsorted(first, pattern.indptr)
-    K = bsr_matrix((blocks, pattern.indices[first], begin), shape=(c * n,) * 2).tocsr()
-    return Assembly(K, Q, slopes, areas)
+    return sums, pattern.indices[first], np.searchsorted(first, pattern.indptr)
 
 
 def element_strain(
@@ -118,7 +125,8 @@ def _affine(
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two linear functions are the reference coordinates, so that inverse_rk = dr_r / dx_k.
     inverse, determinant = g[:, 0, 1:], 2 * w[..., None]
-    pulled = determinant * (np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4, 4) @ tensor)
+    pulled = np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4) @ tensor
+    pulled = determinant * pulled.reshape(-1, 4, tensor.shape[1])
     products = macro.products
     if mixed is not None:
         products = np.concatenate([products, macro.hessians], axis=1)
@@ -212,8 +220,7 @@ def products(g: Float, w: Float) -> Float:
 
 def integrals(g: Float, w: Float) -> Float:
     """Integrate dN_a/dx_k (e, a, 2) by gradients (e, q, a, 2) and weights (e, q)."""
-    integral: Float = np.einsum("eqak,eq->eak", g, w)
-    return integral
+    return np.asarray(np.einsum("eqak,eq->eak", g, w))
 
 
 def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:

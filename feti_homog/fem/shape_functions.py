@@ -144,9 +144,7 @@ class MixedElements:
         """Compute strains (e, q, 3, k) under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
-        slope = slope.reshape(e, q, 2, 2, -1)
-        shear = slope[:, :, 1, 0] + slope[:, :, 0, 1]
-        return np.stack([slope[:, :, 0, 0], slope[:, :, 1, 1], shear], axis=2)
+        return voigt(slope.reshape(e, q, 2, 2, -1))
 
     def dilatation(self, u: Float) -> Float:
         """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
@@ -214,9 +212,9 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
 
 
 def voigt(gradient: Float) -> Float:
-    """Return the strains [11, 22, 12] (e, q, 3) of displacement gradients (e, q, 2, 2)."""
-    shear = gradient[..., 0, 1] + gradient[..., 1, 0]
-    return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
+    """Return the strains [11, 22, 12] (e, q, 3, ..) of displacement gradients (e, q, 2, 2, ..)."""
+    shear = gradient[:, :, 0, 1] + gradient[:, :, 1, 0]
+    return np.stack([gradient[:, :, 0, 0], gradient[:, :, 1, 1], shear], axis=2)
 
 
 def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:

@@ -210,7 +210,7 @@ def boundary_tractions(
     forces, lengths = _forces(cell, responses, groups)
     sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
     for stress, sides, position in groups:
-        ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
+        ends = stress.node_class[sides.nodes[:, [0, -1]]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2
         free = np.repeat(sides.at_void, 2)
         rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])

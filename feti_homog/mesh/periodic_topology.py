@@ -19,7 +19,7 @@ from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Count of numbers / upper bound of the numbers, below which sorting is cheaper than a table of all possible numbers.
-FEW = 1 / 16
+FEW = 1 / 512
 
 
 @dataclass(frozen=True)
@@ -121,20 +121,20 @@ class Torus:
     @cached_property
     def edge_circles(self) -> Float:
         """The circle (e, 3), centre and radius, of each plane edge: radius NaN on ellipses, 0 for straight edges."""
-        circles = np.zeros((len(self.edges), 3))
+        circles = np.zeros((len(self.edges), 3), float if len(self.arcs) else np.float16)  # small in label images
         circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
         return circles
 
     @cached_property
     def edge_turns(self) -> Float:
         """The increment (e,) of the ellipse parameter along each plane edge, at most pi; 0 for straight edges."""
-        turns, curves = np.zeros(len(self.edges)), self.mesh.ellipses[self.mesh.arc_circle]
+        turns, curves = np.zeros_like(self.edge_circles[:, 0]), self.mesh.ellipses[self.mesh.arc_circle]
         start, stop = (curves.unit(self.mesh.points[self.edges[self.arcs, end]] - curves.centres) for end in (0, 1))
         sine = start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]
         turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
         return turns
 
-    @property
+    @cached_property
     def edge_ends(self) -> Int:
         """The classes (torus edges, 2) at the ends of each torus edge."""
         ends = np.empty((len(self.edge_keys), 2), np.int64)
@@ -251,10 +251,9 @@ def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))
-    is_present = np.zeros(size, bool)
+    is_present, place = np.zeros(size, bool), np.empty(size, np.int64)
     is_present[numbers] = True
     members = np.flatnonzero(is_present)
-    place = np.empty(size, np.int64)
     place[members] = np.arange(len(members))
     return members, place[numbers]
 

@@ -169,18 +169,19 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """Restrict a submesh to the coarse triangles `members` (k,)."""
-    vertices, triangles = present(submesh.triangles[members], len(submesh.points))
+    """Restrict a submesh to the coarse triangles `members` (m,)."""
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
+    corners, ends = submesh.triangles[members], submesh.edges[edges]
+    vertices, place = present(np.concatenate([corners.ravel(), ends.ravel()]), len(submesh.points))
     classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
     torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
     rows = zip((members, vertices, edges, classes, torus_edges), ROWS, strict=True)
     return replace(
         submesh,
         **{name: getattr(submesh, name)[some] for some, names in rows for name in names},
-        triangles=triangles,
+        triangles=place[: corners.size].reshape(corners.shape),
         triangle_edges=triangle_edges,
-        edges=np.searchsorted(vertices, submesh.edges[edges]),
+        edges=place[corners.size :].reshape(ends.shape),
         vertex_class=vertex_class,
         edge_class=edge_class,
         pinned=np.flatnonzero(np.isin(classes, submesh.pinned)),

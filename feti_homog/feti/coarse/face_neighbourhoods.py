@@ -13,9 +13,9 @@ edges have no nodes inside, from every second coarse vertex.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
 from scipy.sparse.csgraph import connected_components, dijkstra
 
@@ -38,24 +38,22 @@ def trace_space(
     """
     vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     if not inner:
-        every_second = _every_second(submesh, nodes) if c * len(nodes) >= 2 * min_dofs else identity(len(nodes))
-        return kron(every_second, identity(c)).tocsr()
-    on_edge = nodes >= vertices
-    edge, position = np.divmod(nodes - vertices, max(inner, 1))
-    position += 1
-
-    def is_kept(k: int) -> NDArray[np.bool_]:
-        return np.asarray(~on_edge | (position % k == 0))
-
+        if c * len(nodes) < 2 * min_dofs:
+            return identity(c * len(nodes), format="csr")
+        one_sided = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1
+        ends = submesh.vertex_class[submesh.edges[one_sided[submesh.edge_class]]]
+        pairs = np.searchsorted(nodes, ends[np.isin(ends, nodes).all(axis=1)].T)
+        return _every_second(len(nodes), c, pairs.astype(np.int64).tobytes())
+    position = np.where(nodes >= vertices, (nodes - vertices) % inner + 1, 0)
     k = 1
-    while lattice.intervals % (2 * k) == 0 and c * is_kept(2 * k).sum() >= min_dofs:
+    while lattice.intervals % (2 * k) == 0 and c * np.count_nonzero(position % (2 * k) == 0) >= min_dofs:
         k *= 2
-    keep = is_kept(k)
+    keep = position % k == 0
     m = int(keep.sum())
     number = np.full(vertices + len(submesh.edge_keys) * inner, -1)
     number[nodes[keep]] = np.arange(m)
     between = np.flatnonzero(~keep)
-    edge, lower = edge[between], position[between] // k * k
+    edge, lower = (nodes[between] - vertices) // inner, position[between] // k * k
     ends = np.empty((len(submesh.edge_keys), 2), np.int64)
     ends[submesh.edge_class] = submesh.vertex_class[submesh.edges]
     first = vertices + edge * inner - 1
@@ -71,18 +69,20 @@ def trace_space(
     return csr_matrix(entries, shape=(c * len(nodes), c * m))
 
 
-def _every_second(submesh: Submesh, nodes: Int) -> csr_matrix:
-    """Build the interpolation (n, m) to boundary vertices `nodes` (n,) from every second vertex along the boundary."""
-    one_sided = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1
-    ends = submesh.vertex_class[submesh.edges[one_sided[submesh.edge_class]]]
-    rows, columns = np.searchsorted(nodes, ends[np.isin(ends, nodes).all(axis=1)]).T
-    beside = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(nodes),) * 2).tocsr()
+@lru_cache(maxsize=16)
+def _every_second(n: int, c: int, pairs: bytes) -> csr_matrix:
+    """Build the prolongation (c n, c m) from every second boundary vertex; `pairs` (2, e) are the ends of edges.
+
+    The pieces of a label image have few different boundaries.
+    """
+    rows, columns = np.frombuffer(pairs, np.int64).reshape(2, -1)
+    beside = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()
     beside += beside.T
     start = np.unique(connected_components(beside, directed=False)[1], return_index=True)[1]
     is_odd = dijkstra(beside, indices=start, unweighted=True, min_only=True) % 2 == 1
     # Ends and forks of lines remain, and adjacent nodes at odd distances, which a closed line of odd length has.
     between = is_odd & (np.diff(beside.indptr) == 2) & (beside @ is_odd == 0)
-    return (diags(1.0 - between) + diags(between / 2) @ beside).tocsr()[:, ~between]
+    return kron((diags(1.0 - between) + diags(between / 2) @ beside).tocsr()[:, ~between], identity(c)).tocsr()
 
 
 @dataclass(frozen=True)

@@ -97,11 +97,10 @@ def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
     `keys` (t, 3) and `member` (t,) belong to triangles; negative keys are skipped.  `at_border` is (number of keys,).
     """
     n = int(member.max(initial=0)) + 1
-    low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)
-    for corner in keys.T:
-        np.minimum.at(low, corner, member)
-        np.maximum.at(high, corner, member)
-    may_be_shared = (low[:-1] < high[:-1]) | at_border
+    # One member of each key; the key is shared if another member differs.  The last entry is for negative keys.
+    one, may_be_shared = np.empty(len(at_border) + 1, np.int64), np.append(at_border, False)
+    one[keys] = member[:, None]
+    may_be_shared[keys[one[keys] != member[:, None]]] = True
     chosen = (keys >= 0) & may_be_shared[keys]
     pairs = np.unique(keys[chosen] * n + np.broadcast_to(member[:, None], keys.shape)[chosen])
     return pairs // n, pairs % n
