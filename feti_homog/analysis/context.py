@@ -225,10 +225,8 @@ class AnalysisContext:
         """
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
-        energies = {
-            "stored": sum(response.stored for response in responses),
-            "stored_in_springs": sum(response.in_springs for response in responses),
-        }
+        in_springs = sum(response.in_springs for response in responses)
+        energies = {"stored": sum(response.stored for response in responses), "stored_in_springs": in_springs}
         iterations = sum(response.state.iterations for response in responses)
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 

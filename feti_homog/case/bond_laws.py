@@ -37,13 +37,13 @@ class BondLawEntry:
 
     def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
         """Word the fault of a required key that a table lacks, with a value that the user may choose."""
-        words = f": missing; law = {wording.toml_value(self.name)} needs it"
+        fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
-            return f"{words}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
+            return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
         stiffness = (
             "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
         )
-        return f"{words}, such as {stiffness}" if name == STIFFNESSES[0] else words
+        return f"{fault}, such as {stiffness}" if name == STIFFNESSES[0] else fault
 
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")

@@ -97,8 +97,8 @@ def _read_material(
     names, given = [*table] if isinstance(table, dict) else [], dict[str, list[str]]()
     sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
     if not sheet.keys() <= FORMS_OF.keys():
-        words = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
-        reader.faults.append(f"[{section}] {words}: give {', '.join(sheet.values())}")
+        axes = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
+        reader.faults.append(f"[{section}] {axes}: give {', '.join(sheet.values())}")
         return None
     for name, (form, *further) in FORMS_OF.items():
         if name in names and not further:
