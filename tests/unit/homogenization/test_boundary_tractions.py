@@ -15,7 +15,7 @@ def group(points, sides, first):
         node_class=np.arange(3), triangles=np.arange(3)[None], problem=SimpleNamespace(components=2)
     )
     on_arc = SimpleNamespace(
-        element=np.zeros(sides, int), ends=ends, points=np.array(points)[ends], at_void=np.zeros(sides, bool)
+        element=np.zeros(sides, int), nodes=ends, points=np.array(points)[ends], at_void=np.zeros(sides, bool)
     )
     return mesh_estimate.Group(stress, on_arc, first + 2 * np.arange(3))
 
