@@ -234,7 +234,7 @@ class AnalysisContext:
         """Return the notes, and remarks on singular stresses, undetermined strains and absurd strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
-            lines.append(f"largest stresses of the phases: beside {' and '.join(places)} they rise with finer elements")
+            lines.append(f"largest stresses beside {' and '.join(places)} rise without limit with finer elements")
         if names := [name for name in voigt.SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
             points = f" at {sum(map(bool, self.undetermined))} of {len(self.undetermined)} points"
             where = points if self.case.section.is_followed else ""

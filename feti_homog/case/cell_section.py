@@ -101,7 +101,7 @@ class Cell:
     )
     refine: int = key(
         types.integer(least=0, most=8),
-        "How often every element is split in four, in parallel; new nodes follow round and elliptic interfaces.",
+        "Number of times that every element is split in four; new nodes lie on round and elliptic interfaces.",
         default=0,
     )
     accuracy: float | None = meshed_key(

@@ -41,8 +41,8 @@ class Arc:
     )
     angle: float | None = key(
         types.real(least=0.0, most=360.0),
-        "Angle from end to end of the arc, measured at the centre of the fibre. 0: perfect bonding. 360: nothing holds "
-        "the fibre, and its rigid motions are left out.",
+        "Angle from end to end of the arc, measured at the centre of the fibre. 0: perfect bonding. 360: the fibre is "
+        "free, and its rigid-body motions are removed.",
         unit="degrees",
         only=kinds.ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope", "conductivity"),
     )
@@ -178,7 +178,7 @@ class InterfaceSection:
     )
     softening_tolerance: float = key(
         types.real(above=0.0, most=1.0),
-        "Largest excess of the first tooth over the peak traction / peak traction.",
+        "Largest relative excess of the first tooth over the peak traction.",
         default=0.02,
         only=IF_SOFTENING,
     )
@@ -202,8 +202,8 @@ class InterfaceSection:
     )
     growth: str = key(
         types.choice("released", "springs"),
-        'How debonds grow. "released": a bond beside a broken bond breaks when its break releases G_c times its '
-        'length, which hardly depends on the mesh. "springs": it breaks by the energy of its spring, as others do.',
+        'How debonds grow. "released": a bond beside a broken bond breaks when this releases G_c times its length, '
+        'nearly independent of the mesh. "springs": every bond breaks by the energy of its spring.',
         default="released",
         only=kinds.BY_ENERGY,
         instead="no growth: a law that softens dissipates the energy of its teeth, at tips too",

@@ -77,7 +77,7 @@ PETSC_OPTION = KeyRow(
     "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
 )  # fmt: skip
 DEVIATION = KeyRow(
-    "SECTION.KEY", "a number above 0", "that of the key", "", "",
+    "SECTION.KEY", "a number above 0", "the key's unit", "", "",
     "Standard deviation of a number, whose own value is the mean. Instead, the number itself may be {mean, std} or "
     "{mean, cv}, with cv = std / |mean|.",
 )  # fmt: skip

@@ -41,10 +41,10 @@ FIT_HELP = (
     "if the model does not describe the data (a chance below 1e-3)."
 )
 SCATTER_HELP = (
-    "Find the scatter of the constants, onsets and peaks of a case whose numbers are {mean, std} or {mean, cv}, with "
-    "the share of each number, beside the scatter between realisations of a random cell and the mesh error. Where a "
-    "result has no exact derivative, the case also runs one standard deviation below and above the mean. The same "
-    "command resumes."
+    "Find how the scatter of numbers {mean, std} or {mean, cv} of a case spreads to constants, onsets and peaks, with "
+    "the share of each number. The scatter between realisations of a random cell and the mesh error stand beside it. "
+    "Where a result has no exact derivative, the case also runs one standard deviation below and above the mean. The "
+    "same command resumes."
 )
 
 

@@ -148,7 +148,7 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
         if (ratio := k * radii.mean() / _modulus(case, "matrix")) < 50.0:
             line = f"[{section}] {name} = {k:g}: k r / E' = {ratio:.2g}, so the springs take part of the deformation; "
             unit = "; check the unit of length" if ratio < 0.1 else ""
-            lines.append(f"{line}from {50.0 * k / ratio:.2g} on less than 10 %{unit}")
+            lines.append(f"{line}less than 10 % of it with at least {50.0 * k / ratio:.2g}{unit}")
     return lines
 
 
@@ -202,7 +202,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
         stiffness, toughness = max(pair for pair in pairs if all(pair))
         strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
         zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}"
-    limit = f"elements should be at most {'a third' if softens else 'half'} of that"
+    limit = f"elements should be at most {'a third' if softens else 'half'} as long"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.
     needed = resolved * length * 2**case.cell.refine / width

@@ -121,8 +121,8 @@ class TransverselyIsotropic:
     E_transverse: float = stress("Young's modulus in the plane.")
     nu_axial: float | None = key(
         types.real(),
-        "Contraction in the plane per stretch under stress along x3, "
-        "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse; plane strain needs it.",
+        "Contraction in the plane / strain along x3, under stress along x3; "
+        "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse. Plane strain needs it.",
         default=None,
     )
     nu_transverse: float | None = key(

@@ -141,7 +141,7 @@ CASE_COLUMNS = (
     Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running`, `interrupted` or `waiting`"),
     Column("reason", "", "why there is no result; for an unfinished path, its points and load"),
 )
-INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
+INPUT_COLUMNS = (Column("SECTION.KEY", "the key's unit", "value of a key that varies"),)
 MODULI = {column.name for column in result_json.columns(engineering_constants.Moduli)}
 OUTPUT_COLUMNS = (
     Column("fraction_meshed", "", "area of all fibres / meshed area"),

@@ -69,7 +69,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
-        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less ({noun} {peak['event_left']})"
+        text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
@@ -120,6 +120,6 @@ def _path_energies(document: Document, label: str) -> list[str]:
                 lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
                 break
     if "dissipation_ratio" in last:
-        ratio = f"dissipated: {last['dissipation_ratio']:.4f} times that"
+        ratio = f"dissipated / fracture energy: {last['dissipation_ratio']:.4f}"
         lines.append(f"Fracture energy per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *debonded(document, last)]

@@ -82,8 +82,8 @@ def load_table(document: Document) -> Table:
 
 
 def energies(point: Point, label: str) -> list[str]:
-    springs = f", {point['stored_in_springs']:.6g} of it in springs" if point["stored_in_springs"] else ""
-    error = f", mesh error {point['mesh_error']:.1e} of it" if "mesh_error" in point else ""
+    springs = f", including {point['stored_in_springs']:.6g} in springs" if point["stored_in_springs"] else ""
+    error = f", relative mesh error {point['mesh_error']:.1e}" if "mesh_error" in point else ""
     return [f"Stored per area{label}: {point['stored']:.6g}{springs}{error}"]
 
 

@@ -20,7 +20,7 @@ def test_what_is_left_is_that_after_the_peak() -> None:
     lines = _peak_lines({"case": case, "path": [point] * 4}, peak)
     assert " ".join(" ".join(lines).split()) == (
         "Peak S11 (MPa): 40 at E11 = 0.006 (event 1); first break 30 at 0.005 (event 2); "
-        "20 after the peak as the strain rises, 50.0% less (event 3)"
+        "then falls by 50.0% to 20 as the strain rises (event 3)"
     )
 
 
@@ -41,11 +41,11 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
         ([30, 51.95, 51.75], 0, "Largest S11: 51.95 at", "; the path ends near its peak, 0.4% below it",
          "largest stress"),
         ([-30, -51.95, -51.75], 0, "Largest S11: -51.95 at", "near its peak, 0.4% below it", "largest stress"),
-        ([30, 100, 96], 1, "Largest S11: 100 at", "; 96 after the largest stress, 4.0% less (increment 2); the path "
+        ([30, 100, 96], 1, "Largest S11: 100 at", "; then falls by 4.0% to 96 (increment 2); the path "
          "ends near its peak, 4.0% below it", "largest stress"),
-        ([30, 100, 94], 1, "Peak S11: 100 at", "; 94 after the peak, 6.0% less (increment 2)", "peak"),
-        ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2)", "peak"),
-        ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (increment 2); later up to 90 "
+        ([30, 100, 94], 1, "Peak S11: 100 at", "; then falls by 6.0% to 94 (increment 2)", "peak"),
+        ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2)", "peak"),
+        ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2); later up to 90 "
          "(increment 3)", "peak"),
         ([10, 20, 30], 0, "S11 at the end of the path, no peak yet: 30 at", "(increment 2)", "largest stress and end"),
         ([10, 30, -30], 0, "Peak S11: 30 at", "E11 = 0.00666667 (increment 1)", "peak"),

@@ -165,8 +165,8 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert "101 events, 15 shown; 101 bonds broke" in text
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
     assert line(text, "Work") == "Work per area (GPa): 120"
-    assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
-    assert line(text, "Fracture energy") == "Fracture energy per area (GPa): 40; dissipated: 1.2500 times that"
+    assert line(text, "Stored").endswith("per area (GPa): 70, including 10 in springs")
+    assert line(text, "Fracture energy") == "Fracture energy per area (GPa): 40; dissipated / fracture energy: 1.2500"
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
     first = "S22 (GPa) at the end of the path, no peak yet: -350 at E22 = -0.2 (event 100);"
     assert line(text, "S22 (GPa) at") == first
