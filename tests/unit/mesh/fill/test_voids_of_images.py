@@ -59,7 +59,7 @@ def test_halves_of_pixels_share_diagonals_between_even_nodes(tmp_path, cell):
 def test_voids_part_nothing_and_leave_sides_to_tractions(tmp_path):
     image = np.zeros((6, 6), int)
     image[1:4, 1:4], image[2, 2] = 2, 1
-    line = "a.npy: floating parts, .*: that of 1 pixels with the one in row 4, column 3; expected the label of a void"
+    line = "a.npy: floating parts, .*: the part of 1 pixels around row 4, column 3; expected the label of a void"
     with pytest.raises(MeshError, match=line):
         with_voids(tmp_path, image)
     with pytest.raises(MeshError, match="voids at the sides"):
@@ -73,7 +73,7 @@ def test_parts_join_across_the_period_alone(tmp_path):
     image = np.zeros((6, 6), int)
     image[:, 3], image[0, 0] = 2, 1
     with_voids(tmp_path, image)
-    with pytest.raises(MeshError, match=r"floating parts, .*: that of 12 pixels with the one in row 6, column 5"):
+    with pytest.raises(MeshError, match=r"floating parts, .*: the part of 12 pixels around row 6, column 5"):
         with_voids(tmp_path, image, boundary="displacement")
 
 
