@@ -114,7 +114,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make the sweep folder and hold its lock.  Jobs of single cases share the lock.  Collective."""
+    """Context manager: make the sweep folder and lock it, `shared` or else alone (CaseError if held).  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
