@@ -80,7 +80,7 @@ class EventsInMemory:
         return unpacked(self._events[number])
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays) -> None:
-        """Add event `number`; drop former events from this number on.  Collective.
+        """Add event `number`; drop former events from this number on.
 
         Args:
             shared: values, equal on all ranks.

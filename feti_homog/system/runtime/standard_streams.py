@@ -132,7 +132,7 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Time a `with` block as a stage of the run and of PETSc's log; print its time unless it raises.
+        """Context manager: time a block as a stage of the run and of PETSc's log; print its time unless it raises.
 
         The block may append remarks to the yielded list, which are printed with the time.  Inner stages are excluded.
         """
