@@ -89,7 +89,7 @@ def run_all(
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
     """Run the sweep case `number`, from 1, on all ranks.  Collective.
 
-    Other jobs may run other cases of the sweep at the same time.
+    Other jobs may run other cases at the same time.  `retry` and `quiet` are as in `CaseRunner`.
 
     Raises:
         CaseError: as for `run_all`, or the number is out of range, or another process runs the case.
@@ -152,7 +152,7 @@ class CaseRunner:
     quiet: bool
 
     def run_free(self, shows: bool) -> FetiHomogError | None:
-        """Run cases until no free case remains, and show the progress.  Collective in the group.
+        """Run cases until no free case remains; show the progress if `shows`.  Collective in the group.
 
         The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
         Returns the error that stopped the group, or None.
