@@ -95,7 +95,7 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and the sweep picture; return the lines to print.  Collective over `comm`.
+    """Write cases.csv, statistics.csv and, with `pictures`, a picture; return lines to print.  Collective over `comm`.
 
     The sweep may still be running.  Raises CaseError if `out` is not a sweep folder.
     """

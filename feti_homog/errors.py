@@ -52,7 +52,7 @@ class CaseError(FetiHomogError):
 
 
 class MeshError(FetiHomogError):
-    """The cell cannot be meshed, or a user's mesh is faulty.  Each fault names nodes or elements."""
+    """The cell cannot be meshed, or a user's mesh is faulty.  Each fault names the key, or nodes or elements."""
 
     exit_code = ExitCode.INPUT
 

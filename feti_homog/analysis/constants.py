@@ -273,7 +273,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return the constants of a stiffness by name.  Of (6, 6) they include nu31, nu32 and, with heat, expansions."""
+    """Return the constants of a stiffness by name; for (6, 6) also nu31, nu32 and, with heat, expansions."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {}

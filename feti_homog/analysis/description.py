@@ -89,7 +89,7 @@ def _cost_lines(
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""
     few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
     yield f"estimate   on {ranks} {noun} at most about {few} per rank{all_bonds}, without pictures"
-    most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one per body")
+    most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one rank per body")
     recommended = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
     reason = f"{partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit}"
     yield f"ranks      recommended: {recommended} ({reason})"

@@ -111,7 +111,7 @@ def _run_and_write(
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:
-            line.append(f"{directory}: result.h5 with the mesh, the states follow")
+            line.append(f"{directory}: result.h5 with the mesh; states follow")
             parts = field_parts.mesh_part(cell), field_parts.fibre_part(cell), field_parts.interface_part(cell)
             file = field_file.FieldFile(directory, cell.comm, field_parts.header(cell), *parts)
     with (

@@ -123,7 +123,7 @@ def _read_material(
 
 
 def _known_stress(material: material_forms.Material, plane: str | None) -> None:
-    """Raise ValueError for a strength in a plane state if the constants do not determine S33; skip `plane` None."""
+    """Raise ValueError if the constants leave S33 open; skip `plane` None and plane states with spatial stiffness."""
     is_plane = plane is not None and not voigt.PLANE_STATES[plane].is_spatial
     if is_plane and np.isnan(laws.out_of_plane(material, str(plane))[0]).any():
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")

@@ -14,7 +14,7 @@ from feti_homog.typing import Intracomm
 
 
 def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Draw the pictures of a stored result again.  Collective."""
+    """Draw the pictures of a stored result again; print their paths.  Collective."""
     from feti_homog.report.plots import figures, plot_helpers
 
     directory = _result_folder(arguments)
@@ -30,7 +30,7 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the page report.html of a result.  Collective."""
+    """Write the page report.html of a result; print its path.  Collective."""
     from feti_homog.report import page
 
     directory = _result_folder(arguments)
@@ -41,7 +41,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the states of a result to VTK files.  Collective."""
+    """Write the states of a result to VTK files; print their paths.  Collective."""
     from feti_homog.results import viewed_states
 
     directory = _result_folder(arguments)

@@ -27,7 +27,7 @@ def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the tables and the picture of a sweep.  Collective."""
+    """Write the tables and, unless `no_pictures`, the picture of a sweep; print a summary.  Collective."""
     from feti_homog.studies import collect as tables
 
     for line in mpi_errors.on_root_only(comm, tables.collect, arguments.directory, not arguments.no_pictures) or []:

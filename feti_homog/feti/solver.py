@@ -50,7 +50,7 @@ class FetiSolver:
         preconditioner: M^-1, or H_0 with the adaptive coarse space.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         natural: rigid-body motions, G and P.
-        adaptive: coarse space of the preconditioner, or None.
+        adaptive: adaptive coarse space of the preconditioner, None without one.
         coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.

@@ -184,7 +184,7 @@ class SolverParts:
 
     Attributes:
         operators, preconditioner, natural: boundary operators; M^-1 or H_0; rigid-body motions, G and P.
-        adaptive: coarse space of the preconditioner, or None.
+        adaptive: adaptive coarse space of the preconditioner, None without one.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         method: names of preconditioner and coarse space for the summary.
     """

@@ -93,7 +93,7 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return a mapping of the tips that the mesher moved to vertices for each interface; empty in a user's mesh."""
+        """Return the tips that the mesher moved to vertices, one mapping per interface; empty in a user's mesh."""
         if case.cell.has_own_mesh:
             return ({},) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []

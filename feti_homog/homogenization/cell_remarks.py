@@ -107,7 +107,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List a remark on sides without images, else on linear elements, scatter, `bonds` with teeth, fibres."""
+    """List remarks: on sides without images, or else on order, scatter, teeth of `bonds` (0: unknown), fibre fraction."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"

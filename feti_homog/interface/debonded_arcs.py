@@ -112,7 +112,7 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """Return the directions (k,) of periodic points (k, 2) about the centres of fibres (k,), in [-180, 180], or NaN."""
+    """Return directions (k,) in [-180, 180] of periodic points (k, 2) about fibre centres; NaN without a centre."""
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))

@@ -196,7 +196,7 @@ def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
 def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverseIsotropy:
     """Return the nearest transversely isotropic constants, with `deviation` = ||C - C_nearest|| / ||C||.
 
-    The mean over all turns, as in `about_fibres`, has the expansions alpha_33 and (alpha_11 + alpha_22)/2, or None.
+    The mean over all turns, as in `about_fibres`, has expansions alpha_33 and (alpha_11 + alpha_22)/2, None if unknown.
     """
     c = np.asarray(stiffness, dtype=float)
     table = {name: float(value) for name, value in about_fibres(c).items()}

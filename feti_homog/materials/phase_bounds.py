@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, or None."""
+    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, None without."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -120,7 +120,7 @@ class Estimates:
 
 @dataclass(frozen=True)
 class ConductivityEstimates:
-    """Closed forms for the conductivity of composites with phases that are isotropic in the plane."""
+    """Closed-form conductivities for phases isotropic in the plane.  Bounds are None with interface conductances."""
 
     axial: float = described("along the fibres: the mean, which is exact", "conductivity")
     wiener: Pair | None = described(

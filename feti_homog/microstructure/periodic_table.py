@@ -101,7 +101,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 def _rounded(arrangement: Arrangement) -> Arrangement:
     """Round the lengths of an arrangement to DECIMALS decimals, and its height to GMSH_DECIMALS.
 
-    Centres on the right or upper side move to 0.
+    Coordinates of centres on the right or upper side become 0.
     """
     outlines, least = arrangement.outlines.rounded(arrangements.DECIMALS), 10.0**-arrangements.DECIMALS
     return replace(
@@ -176,9 +176,9 @@ def fibre_rows(table: FibreTable, window: str) -> Int:
 
 
 def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:
-    """Replace images of centres (k, 2) by the centres in the table, plus the moves of a cut window.
+    """Map periodic images `centres` (k, 2) of fibres to the centres in the table, plus the moves by `cut_window.moves`.
 
-    The centres belong to `rows` (k,), by default to all fibres.
+    The images belong to the table indices `rows` (k,), by default to `fibre_rows`.
     """
     listed = table.centres[fibre_rows(table, window) if rows is None else rows]
     size = np.array([table.width, table.height], float)

@@ -159,7 +159,7 @@ def are_units(words: Sequence[str]) -> bool:
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the missing column with a name similar to a word, or an empty string."""
+    """Return the missing column with a name similar to a word; empty without such a column."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 

@@ -46,8 +46,8 @@ def run_all(
     """Run all unfinished cases of a sweep.  Collective.
 
     A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `retry`,
-    failed cases run again.  With `quiet` True nothing is printed; with None the first group shows the progress; with
-    False it also prints a line for each case.
+    failed cases run again.  With `quiet` True only failures are printed; with None the first group also shows the
+    progress; with False it also prints a line for each case, and rank 0 a summary.
 
     Raises:
         CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
@@ -90,7 +90,7 @@ def run_all(
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
     """Run the sweep case `number`, from 1, on all ranks.  Collective.
 
-    Other jobs may run other cases of the sweep at the same time.
+    Other jobs may run other cases at the same time.  `retry` and `quiet` are as in `CaseRunner`.
 
     Raises:
         CaseError: as for `run_all`, or the number is out of range, or another process runs the case.
@@ -115,7 +115,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make the sweep folder and hold its lock.  Jobs of single cases share the lock.  Collective."""
+    """Context manager: make the sweep folder and lock it, `shared` or else alone (CaseError if held).  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -153,7 +153,7 @@ class CaseRunner:
     quiet: bool
 
     def run_free(self, shows: bool) -> FetiHomogError | None:
-        """Run cases until no free case remains, and show the progress.  Collective in the group.
+        """Run cases until no free case remains; show the progress if `shows`.  Collective in the group.
 
         The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
         Returns the error that stopped the group, or None.

@@ -28,7 +28,7 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write the tables and the picture of a sweep to its folder.  On one rank.
+    """Write the tables and, with `pictures`, the picture of a sweep to its folder.  On one rank.
 
     Returns the lines to print.  Raises CaseError like `read`, and FetiHomogError if a file cannot be written.
     """

@@ -85,7 +85,7 @@ class FitReader:
     def tests(
         self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
     ) -> tuple[list[Assignment], list[Datum]]:
-        """Read the case changes of all tests, and their measured values.  Faulty tables give fewer or none."""
+        """Read the case changes of all tests, and their sound measured values.  Faults go to `faults`."""
         if (measured is None) == (tests is None):
             self.faults.append(
                 f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"

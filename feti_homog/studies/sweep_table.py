@@ -144,7 +144,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points that differ by one key only.  `x` has the ascending values of the key."""
+    """A series of sweep points (numbers) that differ by one key and its functions; `x` has the ascending values."""
 
     label: str
     points: list[int]

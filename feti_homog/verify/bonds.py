@@ -151,7 +151,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
     """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,) or None is at all nodes.  With several sections or scattered strengths, the law has numbers (p,).
+    `damage` (k,), if not None, selects softened laws.  Several sections or scattered strengths give arrays (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}

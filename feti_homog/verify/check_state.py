@@ -246,7 +246,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Compute the utilisations 1 / f (n,) of `MODES`.  The load factor f at failure obeys a f^2 + b f = 1."""
+    """Compute the utilisations 1 / f (n,) of `MODES`, with the load factor f at failure."""
     zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))  # both matrix modes count near S11 + S22 = 0
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]

@@ -32,7 +32,7 @@ class Faces:
     """The b torn nodes on both faces of the k interface nodes.
 
     Attributes:
-        row: (b,) interface node of a torn node, or -1.
+        row: (b,) interface node of a torn node, -1 if it has none.
         is_fibre: (b,) whether a torn node belongs to the inner body.
         copies: (b,) number of periodic images of a torn node in its subdomain.
         place, distance: (k,) place of an interface node, and its distance from the node; -1 and inf without a place.
@@ -138,7 +138,7 @@ class DiscreteCell:
 
     @cached_property
     def inner_rows(self) -> Int:
-        """Return the interface nodes (inner sides, 2 or 3) at the nodes of inner torn sides, or -1."""
+        """Return the interface nodes (inner sides, 2 or 3) at the nodes of inner torn sides, -1 where none is."""
         row_of = np.full(len(self.files.mesh.points), -1)
         row_of[self.nodes.node] = self.faces.row
         return np.asarray(row_of[self.sides.nodes[self.inner]])
@@ -198,7 +198,7 @@ class DiscreteCell:
         return np.asarray(strain + np.abs(self.expansions * temperature).max(axis=0))
 
     def scales(self, strain: Float, temperature: float) -> Scales:
-        """Compute the scales of a load; at least ROUNDING x the largest scales."""
+        """Compute the scales of a load; at least ROUNDING x the scales of the largest strain in all states."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
         displacement = float(np.abs(corners @ gradient(loads).T).max())

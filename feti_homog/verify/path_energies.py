@@ -79,7 +79,7 @@ class PointNumbers:
 
 
 def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the strain-controlled dissipation at all points, and stored energies without temperature and friction."""
+    """Check dissipation under strain control and, without temperature and friction, stored energies E.Sigma / 2."""
     points = cell.files.document["path"]
     # The stored energy is E.Sigma / 2 without temperature and friction.
     with_fields = {state.point for state in states}

@@ -214,8 +214,8 @@ class ExactInverse(Preconditioner):
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
-        Both are updated from state to state; arguments as in `multipliers`.  Free bodies have one of their possible
-        positions.  Returns None if the number of pins is not `free`, after `_restart` unless the reference cell is new.
+        Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
+        possible positions.  Returns None unless as many pins exist, after `_restart` if the reference cell is old.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:

@@ -114,7 +114,7 @@ class CondensedMatrix:
 def condensed_with_loads(
     matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None, keep_factor: bool = False
 ) -> CondensedMatrix:
-    """Condense a matrix and `loads` Q (dofs, v) to `rows` (n,) by one elimination; see `schur_complement`."""
+    """Condense a matrix and `loads` Q (dofs, v) to `rows` (n,); see `schur_complement`.  CHOLMOD may `keep_factor`."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order, keep_factor)
     v, n = loads.shape[1], len(rows)

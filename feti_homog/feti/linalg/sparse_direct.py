@@ -194,7 +194,7 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
 
 @contextmanager
 def _unless_given(options: Options, prefix: str) -> Iterator[None]:
-    """Set PETSc options within a `with` block, except options that the user has set."""
+    """Context manager: set PETSc options during a block, except options that the user has set."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():

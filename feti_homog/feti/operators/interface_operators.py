@@ -274,7 +274,7 @@ class InterfaceOperators:
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
     """Factor one subdomain; return its boundary operator and the diagonal of K on `dofs` (n_s,).
 
-    The matrix K is taken from the subdomain.  `keep_factor` is as in `ExplicitInterfaceOperator`.
+    The matrix K is taken from the subdomain.  `explicit` selects `ExplicitInterfaceOperator` with its `keep_factor`.
 
     Raises:
         MeshError: rounding leaves K without a factor.

@@ -101,7 +101,7 @@ class WithSprings:
     """
 
     def __init__(self, body: BoundaryOperator, T: csr_matrix, kernel: Float) -> None:
-        """Compute S~ for the root `T` (n, r) of the compliance C = T T^T, and the `kernel` (n, k) of S."""
+        """Prepare S~, dense if `body` is, from the root `T` (n, r) of C = T T^T and the `kernel` (n, k) of S."""
         self._body, self._T = body, T
         self.is_dense = body.is_dense
         if is_dense(body):

@@ -45,7 +45,7 @@ class ContactProblem:
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
         softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
-        block_pivots: number of block pivots without progress after which single nodes change; 0: at once.
+        block_pivots: number of block pivots, from the last one with progress, before single nodes change; 0: at once.
     """
 
     solver: FetiSolver
@@ -87,7 +87,7 @@ class ContactProblem:
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """Return C / C_0 (k, 3) for pulled and for pressed bonds; None without softening."""
+        """Return C / C_0 (k, 3) for pulled and for pressed bonds; None if all are 1."""
         if not (self._last and self._last[0][0] is bonds):
             pulled, soft, stiff = np.ones(len(bonds.status), bool), None, None
             if self.softening is not None:
@@ -249,7 +249,7 @@ class ContactProblem:
     ) -> Equilibrium:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
-        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and count as open
+        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and become open
         if a fibre is free without these nodes.  The fibre then moves, if there is room, so that its faces part least.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural

@@ -169,7 +169,7 @@ class FollowedStatuses:
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Exchange all rows of M that differ from the arguments; return False if too small pivots leave some."""
+        """Exchange all rows of M that differ from the arguments; return False if tiny pivots leave some unchanged."""
         pending, size = np.flatnonzero((free != self.free) | (slope != self.slope)).tolist(), self._size
         while pending:
             failed = []

@@ -105,8 +105,8 @@ class TipEnergies:
 class ReleasedEnergy(SpringEnergy):
     """The law in which bonds at tips break by the released energy.
 
-    A bond at a tip breaks when this releases G_c l, with tributary length l; others, when the spring energy reaches
-    G_c.
+    A bond at a tip breaks when its break releases G_c l, with tributary length l; another bond breaks when its spring
+    energy reaches G_c.
 
     Attributes:
         influence: inverse dual operator of the plane problem.
@@ -168,7 +168,7 @@ class SpringsAndTips(SpringEnergy):
 
     Attributes:
         tips: tips of this rank.
-        number: (p,) tip number of each node, or -1.
+        number: (p,) tip number of each node, -1 for nodes that are no tips.
         contact: whether contact prevents overlap of faces.
     """
 

@@ -130,7 +130,7 @@ class FrictionlessLeg(Leg):
         yield from self._break_overloaded(is_due)
 
     def _is_due(self) -> bool:
-        """Return whether the most utilised bonds are at their strength.  Collective."""
+        """Return whether the most utilised bonds have reached their strength.  Collective."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:

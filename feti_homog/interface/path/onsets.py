@@ -48,7 +48,7 @@ class Onset:
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays, or inf.
+        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf if none does.
 
         Tractions are `before` (k, c), or 0, + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations
         under `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
@@ -78,7 +78,7 @@ class Onset:
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
-    """Return the fraction of a step at which the first bond breaks, or inf.  Collective.
+    """Return the fraction of a step at which the first bond breaks, inf without a break.  Collective.
 
     The step leads from tractions `before` (k, c) to `after`.  A convex utilisation passes 1 at a single point, which
     bisection finds; without convexity, the first part of the step that ends with a utilisation above 1 is bisected.

@@ -206,7 +206,7 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select one of the names, without repetition."""
+    """Look up the phases of group names in `phase_of`, with keys as from `_key`; skip unknown names and repetitions."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 

@@ -24,7 +24,7 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes in a table that allow mesh nodes at tips or, unless `has_tips`, that do not."""
+    """Return the shapes in a table that allow mesh nodes at tips; without `has_tips`, all other shapes in the table."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 

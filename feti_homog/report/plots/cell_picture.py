@@ -104,7 +104,7 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 
 
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
-    """Draw the cell coloured by its mesh error density.  Returns None without finite errors.
+    """Draw the cell coloured by its mesh error density.  Returns None without finite errors above 0.
 
     The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips lie
     above the colour range: otherwise the rest of the cell would have one colour.

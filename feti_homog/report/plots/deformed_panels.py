@@ -183,7 +183,7 @@ def shown_states(document: Document, most: int, count: int) -> list[int]:
 
 
 def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw panels of several states: path landmarks, or angles."""
+    """Draw panels of several states, path landmarks or angles, with displacements times `scale`."""
     count, analysis = len(file["state"]), reported(document)
     if analysis.is_followed:
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)

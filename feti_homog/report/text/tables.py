@@ -48,7 +48,7 @@ def with_micro(unit: str) -> str:
 
 
 def stress_label(document: Document) -> str:
-    """Return the stress unit of a result, in brackets."""
+    """Return the stress unit of a result, in brackets; empty without a unit."""
     return in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
 
 

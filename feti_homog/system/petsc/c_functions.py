@@ -93,7 +93,7 @@ class CallbackErrors:
 
     @contextmanager
     def raised(self) -> Iterator[None]:
-        """Run a `with` block that calls PETSc; at its end, raise the stored exception in place of PETSc's error."""
+        """Context manager: call PETSc in a block; at its end, raise the stored exception in place of PETSc's error."""
         try:
             yield
         except PETSc.Error:

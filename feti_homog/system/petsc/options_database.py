@@ -16,7 +16,7 @@ READ_WHEN_SOLVING = {f"feti_ksp_{key}" for key in ("converged_reason", "converge
 
 @contextmanager
 def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
-    """Set the options of a case for the `with` block; options of the command line take precedence.
+    """Context manager: set the options of a case during a block; options of the command line take precedence.
 
     False flags are removed for the block: PETSc may take a flag as set, whatever its value.
 

@@ -35,10 +35,10 @@ KEPT = "\n\t"  # characters that are printed although they are not printable; ot
 
 
 def end_on_signals() -> None:
-    """End the process after SIGINT, SIGTERM or SIGXCPU, with exit code 130, 143 or 152 (128 + signal).
+    """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU, with exit code 128 + signal.
 
-    Before it ends, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Ignored
-    signals, as in a background job of a shell, remain ignored.  This function must be called before any thread starts.
+    Before the end, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Signals
+    that are ignored, as in a background job, remain ignored; SIGPIPE is blocked.  Call this before any thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # SIGPIPE is not needed: a write reports that the reader of a pipe has closed it.
@@ -132,7 +132,7 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Time a `with` block as a stage of the run and of PETSc's log; print its time unless it raises.
+        """Context manager: time a block as a stage of the run and of PETSc's log; print its time unless it raises.
 
         The block may append remarks to the yielded list, which are printed with the time.  Inner stages are excluded.
         """
