@@ -1,5 +1,7 @@
 """Make the coarse mesh of a label image: from its pixels, or from regions within smooth outlines."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from feti_homog.case import cell_section
@@ -11,7 +13,7 @@ from feti_homog.microstructure import label_image, phase_names
 from feti_homog.typing import Bool
 
 
-def read_cell(cell: cell_section.Cell) -> CoarseMesh:
+def read_cell(cell: cell_section.Cell, materials: Collection[str] = ()) -> CoarseMesh:
     """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
     Raises:
@@ -21,7 +23,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     assert cell.file is not None
     if cell.geometry == "mesh":
         snap = cell.snap_tolerance if cell.repair == "snap" else None
-        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary)
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh

@@ -49,6 +49,9 @@ def not_finite(mesh: RawMesh) -> list[str]:
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
     size = np.ptp(mesh.points[:, :2], axis=0)
+    if size.min() <= FLAT_AREA * size.max():
+        axis = int(size.argmin())
+        return [f"all nodes have {'xy'[axis]} = {mesh.points[0, axis]:.9g}: expected a mesh in the plane x, y"]
     if np.abs(mesh.points).max() <= types.LARGEST and size.min() >= types.SMALLEST:
         return []
     expected = f"expected lengths and coordinates from {types.SMALLEST} to {types.LARGEST}"

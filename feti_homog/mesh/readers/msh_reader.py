@@ -1,7 +1,7 @@
 """Read a mesh file of a user: name the phases, repair and check the mesh, and convert it into a coarse mesh."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -14,7 +14,7 @@ from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, paired_si
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
-from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
+from feti_homog.mesh.readers.round_interfaces import nearly_round, with_bent_edges, with_circles, with_ellipses
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import wording
 from feti_homog.typing import Float, Int32
@@ -42,6 +42,7 @@ def read(
     phases: Selectors | None = None,
     has_voids: bool = False,
     boundary: str = "periodic",
+    materials: Collection[str] = (),
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
@@ -50,24 +51,27 @@ def read(
     opposite sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
-    numbers in the file (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides
-    (`snapped`).
+    numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
+    relative to the width, nodes first move onto sides (`snapped`).
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
             debonded lines.
     """
     try:
-        raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})
+        loaded = LOADERS[path.suffix.lower()](path)
+        raw = with_phases(loaded, phases or {})
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
         raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
-    _refuse(path.name, mesh_checks.unlabelled(raw), unknown_phases(raw), mesh_checks.stray_lines(raw))
+    unknown = unknown_phases(raw, known_names(loaded), phases or {}, materials)
+    _refuse(path.name, mesh_checks.unlabelled(raw), unknown, mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
-    unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
-    return replace(made(raw, path.name, has_voids, boundary), snapped=moved, remarks=unused)
+    mesh = made(raw, path.name, has_voids, boundary)
+    remarks = (*mesh_checks.unused_curves(raw), *mesh.remarks)
+    return replace(mesh, snapped=moved, remarks=tuple(escaped(f"{path.name}: {remark}") for remark in remarks))
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
@@ -116,7 +120,8 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     mesh = with_circles(mesh, pairs, middles)
     # Number the fibres before edges bend, so that round fibres come first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
-    return replace(with_bent_edges(with_ellipses(mesh, pairs, middles), pairs, middles), precedence=numbers)
+    mesh = with_bent_edges(with_ellipses(mesh, pairs, middles), pairs, middles)
+    return replace(mesh, precedence=numbers, remarks=nearly_round(mesh, pairs, middles))
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
@@ -186,21 +191,29 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     Other groups keep their names. The entry `debonded` selects curves.
 
     Raises:
-        MeshError: names or numbers that no element has, one per line.
+        MeshError: names or numbers that no element has, or groups in two phases, one per line.
     """
-    pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], []
+    pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], list[str]()
+    phase_of = dict[str, str]()
     for phase, name in pairs:
         of_curves = phase == DEBONDED
+        selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
         if _key(name) not in map(_key, _names(mesh, of_curves)):
-            selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
             kind = "lines" if of_curves else "elements"
             faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
-    if faults:
-        raise MeshError(*faults)
-    phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
+        elif not of_curves and (other := phase_of.setdefault(_key(name), phase)) != phase:
+            faults.append(f"{selected}: also in {other}; expected each group in one phase")
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    labels = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
+    labels = [*zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)]
+    for names, numbers in labels:
+        of_name, of_number = _selecting(names, phase_of), _selecting(numbers, phase_of)
+        # The name and the number of one group; the names in Abaqus files are of different sets.
+        if len(names) == 1 and of_name and NUMBER.fullmatch("".join(numbers)) and {*of_number} - {*of_name}:
+            words = f"{_as_selected(names[0])} is {_as_selected(numbers[0])}"
+            faults.append(f"[cell.phases] {of_name[0]}, {of_number[0]}: {words}; expected each group in one phase")
+    if faults:
+        raise MeshError(*faults)
     groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in labels)
     return replace(mesh, groups=groups, curves=curves)
 
@@ -215,8 +228,11 @@ def _key(name: str | int) -> str:
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
-def unknown_phases(mesh: RawMesh) -> list[str]:
-    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases."""
+def unknown_phases(mesh: RawMesh, known: str, phases: Selectors, materials: Collection[str]) -> list[str]:
+    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases.
+
+    `known` lists the names in the file, `phases` are selected already; the proposal fits the names in `materials`.
+    """
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
@@ -230,22 +246,27 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
         faults.append(f'no {mesh.container} is named "matrix"')
     if not faults:
         return []
-    faults[-1] += f"; {known_names(mesh)}"
+    faults[-1] += f"; {known}"
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are checked later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for group, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
             if group and group[0] != phase_names.VOID:
                 shares[group[0]] = shares.get(group[0], 0.0) + percent
-    if shares:
-        first, *smaller = sorted(shares, key=lambda name: ("fib" in name.casefold(), -shares[name]))
-        fibres = ["fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1))]  # groups of these names keep them
-        phases = ["matrix", *(name for name in fibres if name not in smaller)]
-        renamed = map(_as_selected, [first, *(name for name in smaller if name not in fibres)])
-        entries = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in zip(phases, renamed, strict=False))
+    usual = ("matrix", *materials, "fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1)))
+    order = sorted(shares, key=lambda name: (name in materials, "fib" in name.casefold(), -shares[name]))
+    others = [name for name in order if name != "matrix" and name not in phases]
+    first = others[: not has_matrix]
+    if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
+        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *phases, phase_names.COATING)]
+        entries = {phase: [*map(_as_selected, selected)] for phase, selected in phases.items()}
+        entries |= {phase: [_as_selected(name)] for phase, name in zip(targets, renamed, strict=False)}
+        values = (f"[{', '.join(words)}]" if words[1:] else words[0] for words in entries.values())
+        written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in zip(entries, values, strict=True))
+        condition = f"If {_as_selected(first[0])} is the matrix, " if first else "If these are fibres, "
+        condition += "set in" if phases else "add to"
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
-        faults[-1] += f". If {_as_selected(first)} is the matrix, add to [cell]: phases = {{{entries}}}. "
-        faults[-1] += f"Shares of the area: {listed}"
+        faults[-1] += f". {condition} [cell]: phases = {{{written}}}. Shares of the area: {listed}"
     return faults
 
 
@@ -259,6 +280,7 @@ def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
     return list(dict.fromkeys(mesh.curves if of_curves else chain(*mesh.groups, *mesh.aliases)))
 
 
-def _as_selected(name: str) -> str:
+def _as_selected(name: str | int) -> str:
     """Write the name or number of a group as in a case file."""
-    return name.removeprefix("number ") if NUMBER.fullmatch(name) else wording.toml_value(name)
+    is_number = isinstance(name, str) and NUMBER.fullmatch(name)
+    return name.removeprefix("number ") if is_number else wording.toml_value(name)

@@ -10,12 +10,14 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.mesh.readers.raw_mesh import MiddleNodes
+from feti_homog.mesh.readers.raw_mesh import MiddleNodes, first_of
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
+# The same distance, up to which an interface is round to users, who rounded its coordinates.
+NEARLY_ROUND = 1e-3
 # Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
 # polygons.
 MIN_CIRCLE_EDGES = 8
@@ -38,14 +40,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
-        # The circle |d|^2 = 2 c.d + r^2 - |c|^2 that fits best, with offsets d from the mean.
-        mean = places.mean(axis=0)
-        scale = np.abs(places - mean).max()
-        d = (places - mean) / scale
-        (x, y, rest), *_ = np.linalg.lstsq(np.column_stack([2 * d, np.ones(len(d))]), (d**2).sum(axis=1), rcond=None)
-        radius = np.sqrt(max(rest + x * x + y * y, 0.0))
-        circle = Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
-        moved = _moved(mesh.points[classes], places, circle, mesh.period) if _holds(circle, chain) else None
+        circle = _fit_circle(places)
+        moved = _moved(mesh.points[classes], places, circle, mesh.period) if _distance(circle, chain) <= ROUNDNESS_TOLERANCE else None
         if moved is None:
             continue
         points[classes] = moved
@@ -83,7 +79,7 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     ellipses, arcs = list[Ellipses](), list[Int32]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
         ellipse, onward = fit_ellipse(places), np.roll(places, -1, axis=0)
-        if ellipse is None or not _holds(ellipse, chain):
+        if ellipse is None or _distance(ellipse, chain) > ROUNDNESS_TOLERANCE:
             continue
         # The ray to m, the middle of an edge, leaves the ellipse at m / |F^-1 m|.
         m = (places + onward) / 2 - ellipse.centres
@@ -94,6 +90,22 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     added = _with_arcs(mesh, ellipses, arcs)
     ends, number = (curve[len(mesh.arc_edges) :] for curve in (added.arc_edges, added.arc_circle))
     return replace(added, triangles=flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes))
+
+
+def nearly_round(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> tuple[str, ...]:
+    """Remark on polygons with nodes near a circle or ellipse, but not within ROUNDNESS_TOLERANCE."""
+    straight, described = ~np.isin(*(edge_keys(some, len(mesh.points)) for some in (pairs, mesh.arc_edges))), []
+    for _, places, _, _ in _closed_loops(mesh, pairs[straight], middles, MIN_CIRCLE_EDGES):
+        for curve in (_fit_circle(places), fit_ellipse(places, NEARLY_ROUND)):
+            distance = 0.0 if curve is None else _distance(curve, places)
+            if curve is not None and ROUNDNESS_TOLERANCE < distance <= NEARLY_ROUND:
+                (a, b), (x, y) = curve.semi_axes[0], curve.centres[0] % mesh.period + mesh.origin
+                size = f"radius {a:.6g}" if curve.are_round[0] else f"semi-axes {a:.6g} and {b:.6g}"
+                described.append(f"{size} around ({x:.6g}, {y:.6g}), off by {a * distance:.2g}")
+                break
+    advice = "these fibres are polygons; if they should be round, write coordinates with more digits"
+    listed = first_of(described, len(described))
+    return (f"nodes near circles or ellipses, but not on them: {listed}: {advice}",) if described else ()
 
 
 def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
@@ -199,10 +211,21 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
     return moved
 
 
-def fit_ellipse(places: Float) -> Ellipses | None:
+def _fit_circle(places: Float) -> Ellipses:
+    """Fit the circle |d|^2 = 2 c.d + r^2 - |c|^2 to positions (k, 2), with offsets d from the mean."""
+    mean = places.mean(axis=0)
+    scale = np.abs(places - mean).max()
+    d = (places - mean) / scale
+    (x, y, rest), *_ = np.linalg.lstsq(np.column_stack([2 * d, np.ones(len(d))]), (d**2).sum(axis=1), rcond=None)
+    radius = np.sqrt(max(rest + x * x + y * y, 0.0))
+    return Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
+
+
+def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse or fails `_holds`.
+    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse, or beyond the
+    tolerance of the chain as in `_distance`.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -217,11 +240,11 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     level = 1 + centre @ A @ centre
     frame = axes * np.sqrt(level / values)
     ellipse = Ellipses((mean + scale * centre)[None], scale * frame[None])
-    return ellipse if _holds(ellipse, places) else None
+    return ellipse if _distance(ellipse, places) <= tolerance else None
 
 
-def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether a closed chain of positions (k, 2) lies on an ellipse, in steps of at most 60 degrees."""
+def _distance(ellipse: Ellipses, chain: Float) -> float:
+    """Return the largest distance / semi-axis of a closed chain (k, 2) from an ellipse; inf if a step has 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
-    return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))
+    return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf
