@@ -22,6 +22,8 @@ HANGING_DISTANCE = 1e-2
 FLAT_AREA = 1e-9
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
+# Largest snap_tolerance that messages propose.
+MOST_SNAPPED = 0.02
 # Fraction of the cell that rounding of coordinates may leave uncovered.
 ROUNDING = 1e-6
 
@@ -165,9 +167,18 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """List corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
-    missing = [at(corner + origin) for corner in corners if not np.all(plane == corner, axis=1).any()]
-    advice = "of the cell; if a hole is there, shift the fibres until the corners lie in material"
-    return [f"no node at the corner {', '.join(missing)} {advice}"] if missing else []
+    bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
+    missing = [at(corner + origin) for corner in bare]
+    advice = _nearest(plane, bare, size[0], "; if a hole is there, shift the fibres until the corners lie in material")
+    return [f"no node at the corner {', '.join(missing)} of the cell{advice}"] if missing else []
+
+
+def _nearest(plane: Float, places: Float, width: float, advice: str = "") -> str:
+    """Name the distance of `places` (k, 2) from nodes `plane` (n, 2), and propose to snap them or, if far, `advice`."""
+    distance = float(cKDTree(plane).query(places)[0].max()) if len(places) else 0.0
+    if distance <= MOST_SNAPPED * width:
+        advice = f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / width:.2g}'
+    return f"; the nearest nodes are up to {distance:.2g} away{advice}"
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:
@@ -208,6 +219,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
         before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
+        advice += _nearest(plane, plane[single] + shift[:2], size[0])
         faults += _listed(
             before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
         )
