@@ -22,8 +22,6 @@ HANGING_DISTANCE = 1e-2
 FLAT_AREA = 1e-9
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 NO_PARTNER = {(k, i): f"{name} side have no partner on the {SIDES[k, 1 - i]} side: " for (k, i), name in SIDES.items()}
-# Largest snap_tolerance that messages propose.
-MOST_SNAPPED = 0.02
 # Fraction of the cell that rounding of coordinates may leave uncovered.
 ROUNDING = 1e-6
 
@@ -168,17 +166,19 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """List corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
-    missing = [at(corner + origin) for corner in bare]
-    advice = _nearest(plane, bare, size[0], "; if a hole is there, shift the fibres until the corners lie in material")
-    return [f"no node at the corner {', '.join(missing)} of the cell{advice}"] if missing else []
+    missing, advice = (
+        [at(corner + origin) for corner in bare],
+        "if a hole is there, shift the fibres until the corners lie",
+    )
+    away = _nearest(plane, bare, size[0])
+    return [f"no node at the corner {', '.join(missing)} of the cell{away}; {advice} in material"] if missing else []
 
 
-def _nearest(plane: Float, places: Float, width: float, advice: str = "") -> str:
-    """Name the distance of `places` (k, 2) from nodes `plane` (n, 2), and propose to snap them or, if far, `advice`."""
-    distance = float(cKDTree(plane).query(places)[0].max()) if len(places) else 0.0
-    if distance <= MOST_SNAPPED * width:
-        advice = f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / width:.2g}'
-    return f"; the nearest nodes are up to {distance:.2g} away{advice}"
+def _nearest(plane: Float, places: Float, width: float, close: float = 0.02) -> str:
+    """Name the distance of `places` (k, 2) from nodes `plane` (n, 2); propose to snap nodes within `close` widths."""
+    distance = float(cKDTree(plane).query(places)[0].max(initial=0.0))
+    snap = f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / width:.2g}'
+    return f"; the nearest nodes are up to {distance:.2g} away{snap if distance <= close * width else ''}"
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:

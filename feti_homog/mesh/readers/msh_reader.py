@@ -14,7 +14,7 @@ from feti_homog.mesh.coarse_mesh import SAME_PLACE, CoarseMesh, areas, paired_si
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
-from feti_homog.mesh.readers.round_interfaces import nearly_round, with_bent_edges, with_circles, with_ellipses
+from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import wording
 from feti_homog.typing import Float, Int32
@@ -98,19 +98,9 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     names, (width, height) = [group[0] for group in raw.groups], size.tolist()
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
     phase = np.array([phases.index(name) for name in names], np.int32)[raw.group]
-    mesh = CoarseMesh(
-        width=width,
-        height=height,
-        points=plane,
-        triangles=raw.triangles,
-        phase=phase,
-        phases=phases,
-        precedence=phase,
-        representative=representatives(plane, *shift),
-        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
-        origin=(float(origin[0]), float(origin[1])),
-        boundary=boundary,
-    )
+    lines, corner = np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32), (float(origin[0]), float(origin[1]))
+    mesh = CoarseMesh(width, height, plane, raw.triangles, phase, phases, phase, representatives(plane, *shift))
+    mesh = replace(mesh, debonded_edges=lines, origin=corner, boundary=boundary)
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     torus = Torus.of(mesh)
     _refuse(path, mesh_checks.islands(raw, torus), mesh_checks.void_faults(raw, torus, has_voids))
@@ -120,8 +110,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     mesh = with_circles(mesh, pairs, middles)
     # Number the fibres before edges bend, so that round fibres come first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
-    mesh = with_bent_edges(with_ellipses(mesh, pairs, middles), pairs, middles)
-    return replace(mesh, precedence=numbers, remarks=nearly_round(mesh, pairs, middles))
+    return replace(with_bent_edges(with_ellipses(mesh, pairs, middles), pairs, middles), precedence=numbers)
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
@@ -203,19 +192,15 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
             faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
         elif not of_curves and (other := phase_of.setdefault(_key(name), phase)) != phase:
             faults.append(f"{selected}: also in {other}; expected each group in one phase")
-    lines = set(map(_key, phases.get(DEBONDED, ())))
-    curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    labels = [*zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)]
-    for names, numbers in labels:
-        of_name, of_number = _selecting(names, phase_of), _selecting(numbers, phase_of)
-        # The name and the number of one group; the names in Abaqus files are of different sets.
-        if len(names) == 1 and of_name and NUMBER.fullmatch("".join(numbers)) and {*of_number} - {*of_name}:
-            words = f"{_as_selected(names[0])} is {_as_selected(numbers[0])}"
-            faults.append(f"[cell.phases] {of_name[0]}, {of_number[0]}: {words}; expected each group in one phase")
     if faults:
         raise MeshError(*faults)
-    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in labels)
-    return replace(mesh, groups=groups, curves=curves)
+    lines = set(map(_key, phases.get(DEBONDED, ())))
+    curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
+    groups = list[tuple[str, ...]]()
+    for names, aliases in zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True):
+        numbered = (*names, *filter(NUMBER.fullmatch, aliases))  # a name and its number may not be in two phases
+        groups.append(_selecting(numbered, phase_of) or _selecting(aliases, phase_of) or names)
+    return replace(mesh, groups=tuple(groups), curves=curves)
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
@@ -228,10 +213,10 @@ def _key(name: str | int) -> str:
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
-def unknown_phases(mesh: RawMesh, known: str, phases: Selectors, materials: Collection[str]) -> list[str]:
+def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Collection[str]) -> list[str]:
     """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases.
 
-    `known` lists the names in the file, `phases` are selected already; the proposal fits the names in `materials`.
+    `content` lists the names in the file, `phases` are selected already; the proposal fits the names in `materials`.
     """
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
@@ -246,7 +231,7 @@ def unknown_phases(mesh: RawMesh, known: str, phases: Selectors, materials: Coll
         faults.append(f'no {mesh.container} is named "matrix"')
     if not faults:
         return []
-    faults[-1] += f"; {known}"
+    faults[-1] += f"; {content}"
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are checked later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
@@ -259,12 +244,11 @@ def unknown_phases(mesh: RawMesh, known: str, phases: Selectors, materials: Coll
     first = others[: not has_matrix]
     if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
         targets = [name for name in dict.fromkeys(usual) if name not in (*names, *phases, phase_names.COATING)]
-        entries = {phase: [*map(_as_selected, selected)] for phase, selected in phases.items()}
-        entries |= {phase: [_as_selected(name)] for phase, name in zip(targets, renamed, strict=False)}
-        values = (f"[{', '.join(words)}]" if words[1:] else words[0] for words in entries.values())
-        written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in zip(entries, values, strict=True))
-        condition = f"If {_as_selected(first[0])} is the matrix, " if first else "If these are fibres, "
-        condition += "set in" if phases else "add to"
+        entries = {name: wording.toml_value([*some] if some[1:] else some[0]) for name, some in phases.items()}
+        entries |= dict(zip(targets, map(_as_selected, renamed), strict=False))
+        written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in entries.items())
+        condition = f"If {_as_selected(first[0])} is the matrix" if first else "If these are fibres"
+        condition += ", set in" if phases else ", add to"
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
         faults[-1] += f". {condition} [cell]: phases = {{{written}}}. Shares of the area: {listed}"
     return faults
@@ -280,7 +264,6 @@ def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
     return list(dict.fromkeys(mesh.curves if of_curves else chain(*mesh.groups, *mesh.aliases)))
 
 
-def _as_selected(name: str | int) -> str:
+def _as_selected(name: str) -> str:
     """Write the name or number of a group as in a case file."""
-    is_number = isinstance(name, str) and NUMBER.fullmatch(name)
-    return name.removeprefix("number ") if is_number else wording.toml_value(name)
+    return name.removeprefix("number ") if NUMBER.fullmatch(name) else wording.toml_value(name)
