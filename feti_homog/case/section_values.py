@@ -83,7 +83,7 @@ RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", typ
 FIBRE = types.integer(least=1)
 FIBRES = replace(
     types.either(
-        'the number of a fibre, a list of numbers, or "all", with which `feti-homog fibres CASE.toml` prints numbers',
+        'the number of a fibre, a list of numbers, or "all"; with "all", `feti-homog fibres CASE.toml` prints numbers',
         *(types.choice("all"), FIBRE, types.list_of(FIBRE, "", least=1)),
     ),
     store=lambda value: value if value == "all" else tuple(value if isinstance(value, list) else [value]),

@@ -20,20 +20,23 @@ def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
     The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
-    coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell.
+    coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell, unless
+    fibres are neither discs nor ellipses: these fibres have no radius, and no centre if they wind around the cell.
 
     Raises:
-        CaseError, MeshError: the source is faulty or does not list its voids, or a fibre is neither disc nor ellipse.
+        CaseError, MeshError: the source is faulty, or does not list its voids.
     """
-    fibres = read(source)
+    fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
     if fibres.lacks_voids:
         raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
-    ellipses, is_round = fibres.ellipses, fibres.ellipses.are_round
-    a, b = ellipses.semi_axes.T
+    ellipses = fibres.ellipses
+    with np.errstate(invalid="ignore"):  # frames are NaN for other shapes
+        is_round = ellipses.are_round
+    a, b = np.where(np.isnan(fibres.coatings), np.nan, ellipses.semi_axes.T)  # without a thickness of the coating
     columns = dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
     columns["radius"] = _words(np.where(is_round, a, np.nan))
     columns["phase"] = list(fibres.phases)
-    if not is_round.all():
+    if not (is_round | np.isnan(a)).all():
         columns |= {name: _words(np.where(is_round, np.nan, of)) for name, of in zip("ab", (a, b), strict=True)}
         columns["angle"] = _words(np.where(is_round, np.nan, ellipses.angles))
     if fibres.coatings.any():
@@ -45,9 +48,9 @@ def table(source: Path) -> str:
         columns["inner_radius"] = _words(fibres.cores)
     columns["number"] = ["" if name == phase_names.VOID else str(k) for k, name in enumerate(fibres.phases, 1)]
     rows = map(",".join, zip(*columns.values(), strict=True))
-    reach = fibres.ellipses.longest[:, None]
-    low, high = (ellipses.centres + reach).min(axis=0), (ellipses.centres - reach).max(axis=0) - fibres.size
-    (width, height), (left, bottom) = fibres.size.tolist(), np.clip(fibres.origin, high, low).tolist()
+    centres, reach = ellipses.centres[~np.isnan(a)], ellipses.longest[~np.isnan(a), None]
+    low, high = (centres + reach).min(axis=0, initial=np.inf), (centres - reach).max(axis=0, initial=-np.inf)
+    (width, height), (left, bottom) = fibres.size.tolist(), np.clip(fibres.origin, high - fibres.size, low).tolist()
     size = f"# width = {width!r}, height = {height!r}, left = {left!r}, bottom = {bottom!r}"
     return "\n".join([size, ",".join(columns), *rows])
 
@@ -86,20 +89,6 @@ class ListedFibres:
     def radii(self) -> Float:
         """The radii (N,) of circles, and of equal-area discs for ellipses."""
         return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
-
-
-def read(source: Path) -> ListedFibres:
-    """Read the fibres of a case file or result folder.  On one rank.
-
-    Raises CaseError or MeshError if the source is faulty, or a fibre is neither round nor an ellipse.
-    """
-    fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
-    sizes = np.column_stack([fibres.ellipses.centres, fibres.radii, fibres.coatings])
-    lost = [*map(str, np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1)]
-    if lost:
-        line = f"{source}: fibres that are neither round nor ellipses have no radius: {', '.join(lost[:10])}"
-        raise CaseError(f"{line}; `feti-homog check` prints the centres of debonded ones")
-    return fibres
 
 
 def _of_result(directory: Path) -> ListedFibres:

@@ -73,7 +73,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
     if case.cell.has_own_mesh:
         from feti_homog.mesh.fill import pixel_mesher  # imports the readers of all formats
 
-        cell = pixel_mesher.read_cell(case.cell)
+        cell = pixel_mesher.read_cell(case.cell, tuple(case.materials))
     else:
         listed = None if case.cell.table is None else arrange.arrange(case.cell)
         estimate = element_estimate.ElementEstimate.of(case.cell, listed)

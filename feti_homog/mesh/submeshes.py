@@ -20,6 +20,8 @@ ROWS = (
     ("touching", "class_keys"),
     ("at_void", "debonded", "edge_keys"),
 )
+# Other arrays that a submesh has in common with `Torus`.
+SHARED = ("triangle_edges", "edges", "constituent", *ROWS[3], *ROWS[4])
 
 
 @dataclass(frozen=True)
@@ -227,20 +229,13 @@ def _whole(torus: Torus, pinned: Int) -> Submesh:
         index=0,
         body=0,
         phase="",
-        constituent=torus.constituent,
+        **{name: getattr(torus, name) for name in SHARED},
         points=mesh.points,
         triangles=mesh.triangles.astype(np.int64),
-        triangle_edges=torus.triangle_edges,
-        edges=torus.edges,
         circles=torus.edge_circles,
         turns=torus.edge_turns,
         vertex_class=torus.node_class,
         edge_class=torus.torus_edge,
-        at_void=torus.at_void,
-        debonded=torus.debonded,
-        touching=torus.touching,
-        class_keys=torus.class_keys,
-        edge_keys=torus.edge_keys,
         period=mesh.period,
         origin=np.array(mesh.origin),
         pinned=np.flatnonzero(np.isin(torus.class_keys, pinned)),

@@ -11,7 +11,7 @@ from feti_homog.microstructure import label_image, phase_names
 from feti_homog.typing import Bool
 
 
-def read_cell(cell: cell_section.Cell) -> CoarseMesh:
+def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> CoarseMesh:
     """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
     Raises:
@@ -21,7 +21,7 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
     assert cell.file is not None
     if cell.geometry == "mesh":
         snap = cell.snap_tolerance if cell.repair == "snap" else None
-        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary)
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh
@@ -37,16 +37,10 @@ def read_cell(cell: cell_section.Cell) -> CoarseMesh:
         node_class, first = places % [columns, rows] @ [1, n], np.empty(n * rows, np.int32)
         first[node_class[::-1]] = representative[::-1]
         representative = first[node_class]
+    width, height, points = cell.pixel * columns, cell.pixel * rows, cell.pixel * places
+    names = tuple(name for name in phases if name != phase_names.VOID)
     mesh = CoarseMesh(
-        width=cell.pixel * columns,
-        height=cell.pixel * rows,
-        points=cell.pixel * places,
-        triangles=elements.astype(np.int32),
-        phase=number,
-        phases=tuple(name for name in phases if name != phase_names.VOID),
-        precedence=number,
-        representative=representative,
-        boundary=cell.boundary,
+        width, height, points, elements.astype(np.int32), number, names, number, representative, boundary=cell.boundary
     )
     if faults := [] if len(solid) == phase.size else _void_faults(mesh, is_solid):
         raise MeshError(*(f"{cell.file.name}: {fault}" for fault in faults))

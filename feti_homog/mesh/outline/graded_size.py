@@ -135,10 +135,7 @@ class SizeField:
         nearest: int = NEAREST,
         chunk: int = CHUNK,
     ) -> None:
-        """Prepare sources on the torus with periods `size` (2,).
-
-        The size at a position depends on the `nearest` sources; a query has at most `chunk` positions.
-        """
+        """Prepare sources on the torus with periods `size` (2,): `nearest` count at a position, a query has `chunk`."""
         self.largest, self.graded = largest, graded
         self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))

@@ -49,6 +49,9 @@ def not_finite(mesh: RawMesh) -> list[str]:
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
     size = np.ptp(mesh.points[:, :2], axis=0)
+    if size.min() <= FLAT_AREA * size.max():
+        axis = int(size.argmin())
+        return [f"all nodes have {'xy'[axis]} = {mesh.points[0, axis]:.9g}: expected a mesh in the plane x, y"]
     if np.abs(mesh.points).max() <= types.LARGEST and size.min() >= types.SMALLEST:
         return []
     expected = f"expected lengths and coordinates from {types.SMALLEST} to {types.LARGEST}"
@@ -162,9 +165,20 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """List corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
-    missing = [at(corner + origin) for corner in corners if not np.all(plane == corner, axis=1).any()]
-    advice = "of the cell; if a hole is there, shift the fibres until the corners lie in material"
-    return [f"no node at the corner {', '.join(missing)} {advice}"] if missing else []
+    bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
+    missing, advice = (
+        [at(corner + origin) for corner in bare],
+        "if a hole is there, shift the fibres until the corners lie",
+    )
+    away = _nearest(plane, bare, size[0])
+    return [f"no node at the corner {', '.join(missing)} of the cell{away}; {advice} in material"] if missing else []
+
+
+def _nearest(plane: Float, places: Float, width: float, close: float = 0.02) -> str:
+    """Name the distance of `places` (k, 2) from nodes `plane` (n, 2); propose to snap nodes within `close` widths."""
+    distance = float(cKDTree(plane).query(places)[0].max(initial=0.0))
+    snap = f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / width:.2g}'
+    return f"; the nearest nodes are up to {distance:.2g} away{snap if distance <= close * width else ''}"
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:
@@ -205,6 +219,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
         shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
         before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
+        advice += _nearest(plane, plane[single] + shift[:2], size[0])
         faults += _listed(
             before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
         )

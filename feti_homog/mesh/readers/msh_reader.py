@@ -1,7 +1,7 @@
 """Read a mesh file of a user: name the phases, repair and check the mesh, and convert it into a coarse mesh."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -42,6 +42,7 @@ def read(
     phases: Selectors | None = None,
     has_voids: bool = False,
     boundary: str = "periodic",
+    materials: Collection[str] = (),
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
@@ -50,24 +51,27 @@ def read(
     opposite sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
-    numbers in the file (`with_phases`). With the tolerance `snap`, relative to the width, nodes first move onto sides
-    (`snapped`).
+    numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
+    relative to the width, nodes first move onto sides (`snapped`).
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
             debonded lines.
     """
     try:
-        raw = with_phases(LOADERS[path.suffix.lower()](path), phases or {})
+        loaded = LOADERS[path.suffix.lower()](path)
+        raw = with_phases(loaded, phases or {})
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
         raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
-    _refuse(path.name, mesh_checks.unlabelled(raw), unknown_phases(raw), mesh_checks.stray_lines(raw))
+    unknown = unknown_phases(raw, known_names(loaded), phases or {}, materials)
+    _refuse(path.name, mesh_checks.unlabelled(raw), unknown, mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
-    unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
-    return replace(made(raw, path.name, has_voids, boundary), snapped=moved, remarks=unused)
+    mesh = made(raw, path.name, has_voids, boundary)
+    remarks = (*mesh_checks.unused_curves(raw), *mesh.remarks)
+    return replace(mesh, snapped=moved, remarks=tuple(escaped(f"{path.name}: {remark}") for remark in remarks))
 
 
 def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "periodic") -> CoarseMesh:
@@ -94,19 +98,9 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     names, (width, height) = [group[0] for group in raw.groups], size.tolist()
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
     phase = np.array([phases.index(name) for name in names], np.int32)[raw.group]
-    mesh = CoarseMesh(
-        width=width,
-        height=height,
-        points=plane,
-        triangles=raw.triangles,
-        phase=phase,
-        phases=phases,
-        precedence=phase,
-        representative=representatives(plane, *shift),
-        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
-        origin=(float(origin[0]), float(origin[1])),
-        boundary=boundary,
-    )
+    lines, corner = np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32), (float(origin[0]), float(origin[1]))
+    mesh = CoarseMesh(width, height, plane, raw.triangles, phase, phases, phase, representatives(plane, *shift))
+    mesh = replace(mesh, debonded_edges=lines, origin=corner, boundary=boundary)
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     torus = Torus.of(mesh)
     _refuse(path, mesh_checks.islands(raw, torus), mesh_checks.void_faults(raw, torus, has_voids))
@@ -186,23 +180,27 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     Other groups keep their names. The entry `debonded` selects curves.
 
     Raises:
-        MeshError: names or numbers that no element has, one per line.
+        MeshError: names or numbers that no element has, or groups in two phases, one per line.
     """
-    pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], []
+    pairs, faults = [(phase, name) for phase, selected in phases.items() for name in selected], list[str]()
+    phase_of = dict[str, str]()
     for phase, name in pairs:
         of_curves = phase == DEBONDED
+        selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
         if _key(name) not in map(_key, _names(mesh, of_curves)):
-            selected = f"[cell.phases] {wording.toml_key(phase)} = {wording.toml_value(name)}"
             kind = "lines" if of_curves else "elements"
             faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
+        elif not of_curves and (other := phase_of.setdefault(_key(name), phase)) != phase:
+            faults.append(f"{selected}: also in {other}; expected each group in one phase")
     if faults:
         raise MeshError(*faults)
-    phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    labels = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
-    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in labels)
-    return replace(mesh, groups=groups, curves=curves)
+    groups = list[tuple[str, ...]]()
+    for names, aliases in zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True):
+        numbered = (*names, *filter(NUMBER.fullmatch, aliases))  # a name and its number may not be in two phases
+        groups.append(_selecting(numbered, phase_of) or _selecting(aliases, phase_of) or names)
+    return replace(mesh, groups=tuple(groups), curves=curves)
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
@@ -215,8 +213,11 @@ def _key(name: str | int) -> str:
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
-def unknown_phases(mesh: RawMesh) -> list[str]:
-    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases."""
+def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Collection[str]) -> list[str]:
+    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases.
+
+    `content` lists the names in the file, `phases` are selected already; the proposal fits the names in `materials`.
+    """
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names
     expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
@@ -230,22 +231,26 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
         faults.append(f'no {mesh.container} is named "matrix"')
     if not faults:
         return []
-    faults[-1] += f"; {known_names(mesh)}"
+    faults[-1] += f"; {content}"
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are checked later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         for group, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
             if group and group[0] != phase_names.VOID:
                 shares[group[0]] = shares.get(group[0], 0.0) + percent
-    if shares:
-        first, *smaller = sorted(shares, key=lambda name: ("fib" in name.casefold(), -shares[name]))
-        fibres = ["fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1))]  # groups of these names keep them
-        phases = ["matrix", *(name for name in fibres if name not in smaller)]
-        renamed = map(_as_selected, [first, *(name for name in smaller if name not in fibres)])
-        entries = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in zip(phases, renamed, strict=False))
+    usual = ("matrix", *materials, "fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1)))
+    order = sorted(shares, key=lambda name: (name in materials, "fib" in name.casefold(), -shares[name]))
+    others = [name for name in order if name != "matrix" and name not in phases]
+    first = others[: not has_matrix]
+    if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
+        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *phases, phase_names.COATING)]
+        entries = {name: wording.toml_value([*some] if some[1:] else some[0]) for name, some in phases.items()}
+        entries |= dict(zip(targets, map(_as_selected, renamed), strict=False))
+        written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in entries.items())
+        condition = f"If {_as_selected(first[0])} is the matrix" if first else "If these are fibres"
+        condition += ", set in" if phases else ", add to"
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
-        faults[-1] += f". If {_as_selected(first)} is the matrix, add to [cell]: phases = {{{entries}}}. "
-        faults[-1] += f"Shares of the area: {listed}"
+        faults[-1] += f". {condition} [cell]: phases = {{{written}}}. Shares of the area: {listed}"
     return faults
 
 

@@ -10,12 +10,14 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.mesh.readers.raw_mesh import MiddleNodes
+from feti_homog.mesh.readers.raw_mesh import MiddleNodes, first_of
 from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
+# The same distance, up to which coarser rounding may have made a polygon of a circle.
+NEARLY_ROUND = 1000 * ROUNDNESS_TOLERANCE
 # Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
 # polygons.
 MIN_CIRCLE_EDGES = 8
@@ -45,7 +47,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
         (x, y, rest), *_ = np.linalg.lstsq(np.column_stack([2 * d, np.ones(len(d))]), (d**2).sum(axis=1), rcond=None)
         radius = np.sqrt(max(rest + x * x + y * y, 0.0))
         circle = Ellipses.round(np.array([[*(mean + scale * np.array([x, y])), scale * radius]]))
-        moved = _moved(mesh.points[classes], places, circle, mesh.period) if _holds(circle, chain) else None
+        is_round = _distance(circle, chain) <= ROUNDNESS_TOLERANCE
+        moved = _moved(mesh.points[classes], places, circle, mesh.period) if is_round else None
         if moved is None:
             continue
         points[classes] = moved
@@ -76,14 +79,18 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
-    interfaces do not change. In triangles with two edges on one ellipse, the third edge flips.
+    interfaces do not change; a remark names polygons within NEARLY_ROUND. In triangles with two edges on one ellipse,
+    the third edge flips.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
-    ellipses, arcs = list[Ellipses](), list[Int32]()
+    ellipses, arcs, polygons = list[Ellipses](), list[Int32](), list[str]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
-        ellipse, onward = fit_ellipse(places), np.roll(places, -1, axis=0)
-        if ellipse is None or not _holds(ellipse, chain):
+        ellipse, onward = fit_ellipse(places, NEARLY_ROUND), np.roll(places, -1, axis=0)
+        if ellipse is None or (distance := _distance(ellipse, chain)) > ROUNDNESS_TOLERANCE:
+            if ellipse is not None and len(chain) == len(places):
+                (a, b), (x, y) = ellipse.semi_axes[0], ellipse.centres[0] % mesh.period + mesh.origin
+                polygons.append(f"semi-axes {a:.5g} and {b:.5g} around ({x:.5g}, {y:.5g}), off by {a * distance:.2g}")
             continue
         # The ray to m, the middle of an edge, leaves the ellipse at m / |F^-1 m|.
         m = (places + onward) / 2 - ellipse.centres
@@ -93,7 +100,10 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
             arcs += [pairs[edges] for _, edges in loop]
     added = _with_arcs(mesh, ellipses, arcs)
     ends, number = (curve[len(mesh.arc_edges) :] for curve in (added.arc_edges, added.arc_circle))
-    return replace(added, triangles=flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes))
+    advice = "these fibres are polygons; if they should be round, write coordinates with more digits"
+    remarks = (f"nodes near circles or ellipses, but not on them: {first_of(polygons, len(polygons))}: {advice}",)
+    triangles = flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes)
+    return replace(added, triangles=triangles, remarks=remarks if polygons else ())
 
 
 def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
@@ -199,10 +209,11 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
     return moved
 
 
-def fit_ellipse(places: Float) -> Ellipses | None:
+def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse or fails `_holds`.
+    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse, or beyond the
+    tolerance of the chain as in `_distance`.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -217,11 +228,11 @@ def fit_ellipse(places: Float) -> Ellipses | None:
     level = 1 + centre @ A @ centre
     frame = axes * np.sqrt(level / values)
     ellipse = Ellipses((mean + scale * centre)[None], scale * frame[None])
-    return ellipse if _holds(ellipse, places) else None
+    return ellipse if _distance(ellipse, places) <= tolerance else None
 
 
-def _holds(ellipse: Ellipses, chain: Float) -> bool:
-    """Return whether a closed chain of positions (k, 2) lies on an ellipse, in steps of at most 60 degrees."""
+def _distance(ellipse: Ellipses, chain: Float) -> float:
+    """Return the distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps over 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
-    return bool(chord.max() <= 1 and np.all(np.abs(np.hypot(*on_circle) - 1) <= ROUNDNESS_TOLERANCE))
+    return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

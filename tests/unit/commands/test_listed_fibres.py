@@ -97,15 +97,15 @@ def test_ellipses_of_a_users_mesh_are_found(tmp_path):
     assert np.isnan([table.columns["radius"][0], table.columns["a"][1]]).all()
 
 
-def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
-    """Here of one that is neither round nor an ellipse."""
+def test_fibres_of_other_shapes_have_a_number_and_a_centre(tmp_path):
+    """A case refuses this table: without a radius it cannot give the cell."""
     grid().write(tmp_path / "cell.msh")
     source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
-    with pytest.raises(
-        CaseError, match=r"fibres that are neither round nor ellipses have no radius: 1; `feti-homog check` "
-    ):
-        listed_fibres.table(source)
+    (tmp_path / "t.csv").write_text(listed_fibres.table(source))
+    assert (tmp_path / "t.csv").read_text().splitlines()[1:] == ["x,y,radius,phase,number", "0.5,0.5,,fibre,1"]
+    with pytest.raises(CaseError, match="row 3: radius"):
+        read_table(tmp_path / "t.csv")
 
 
 def test_units_and_names(tmp_path):

@@ -1,5 +1,6 @@
 """Meshes of Abaqus and VTK, and sides that nearly match."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -84,6 +85,18 @@ def test_what_is_farther_than_the_tolerance_is_reported(tmp_path):
     with pytest.raises(MeshError, match=r"node 15 \(1, 0.51\), expected at \(0, 0.51\)"):
         read(path, snap=1e-3)
     assert read(path, snap=2e-2).snapped == pytest.approx(0.005)
+
+
+@pytest.mark.parametrize(
+    ("places", "away"), [((1.0, 0.5003), 3e-4), ((0.9997, 0.5), 3e-4), ((1.0003, 0.5), 3e-4), ((1.0, 0.53), 0.03)]
+)
+def test_sides_that_nearly_match_name_the_distance_and_the_tolerance_that_snaps_them(places, away, tmp_path):
+    path = written(grid().moved(**{f"n{node(4, 2)}": places}), tmp_path / "rough.msh")
+    with pytest.raises(MeshError, match=f"; the nearest nodes are up to {away:g} away") as error:
+        read(path)
+    tolerances = re.findall('repair = "snap" in .cell. moves them, with snap_tolerance = ([0-9.e-]+)', str(error.value))
+    assert (len(tolerances) > 0) == (away < 0.02)
+    assert all(away / 2 < read(path, snap=float(word)).snapped * (1 + 1e-9) <= 1.01 * away for word in tolerances)
 
 
 def test_a_mesh_that_matches_is_not_moved(tmp_path):

@@ -1,5 +1,6 @@
 """Elliptic fibres in meshes of straight edges: found wherever they lie, and followed by refinement."""
 
+import meshio
 import numpy as np
 import pytest
 from support.subdomains import cut
@@ -64,6 +65,24 @@ def test_areas_approach_that_of_the_ellipse_by_h2(stretch, tmp_path):
     mesh, exact = read(tmp_path / "ellipse.msh"), np.pi * 0.15**2 * stretch
     missing = [1 - fibre_area(mesh, refinements=refinements, order=2) / exact for refinements in range(5)]
     assert np.array(missing[:-1]) / missing[1:] == pytest.approx(4.0, rel=2e-2) and 0 < missing[-1] < 1e-4
+
+
+@pytest.mark.parametrize("stretch", [1.0, 1.5])
+@pytest.mark.parametrize(("digits", "remarks"), [(8, 0), (5, 1), (2, 0)])
+def test_fibres_of_rounded_coordinates_are_polygons_with_a_remark(stretch, digits, remarks, tmp_path):
+    """Two digits are far from round; middle nodes bend edges, however rounded."""
+    path = tmp_path / "a.vtu"
+    for order in (1, 2):
+        polar_cell((0.5, 0.5), 0.2, tmp_path / "a.msh", stretch=stretch, size=0.06, order=order)
+        source = meshio.read(tmp_path / "a.msh")
+        source.points = np.round(source.points, digits)
+        numbers = [np.asarray(block) for block in source.cell_data["gmsh:physical"]]
+        meshio.Mesh(source.points, source.cells, cell_data={"phase": [k - 1 for k in numbers]}).write(path)
+        found = read(path).remarks
+        assert len(found) == remarks * (order == 1)
+        assert all(f"semi-axes {axes} around (0.5, 0.5), off by " in line for line in found for axes in
+                   [" and ".join(f"{x:g}" for x in sorted((0.2, 0.2 * stretch), reverse=True))])  # fmt: skip
+        assert (len(read(path).arc_edges) == 0) == (order == 1 and digits < 8)
 
 
 def test_thin_ellipse_with_few_edges_stays_a_polygon(tmp_path):

@@ -1,0 +1,46 @@
+"""[cell.phases]: proposals that can be pasted, and groups that two phases select."""
+
+import re
+import tomllib
+from dataclasses import replace
+
+import pytest
+from unit.mesh.faulty_meshes import grid
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.msh_reader import read
+
+NAMES = {1: "Epoxy resin", 2: "E-Glass"}
+
+
+@pytest.mark.parametrize(
+    ("names", "phases", "materials", "proposed"),
+    [
+        ({1: "resin", 2: "glas fibre"}, {"matrix": ("resin",)}, (), 'set in [cell]: phases = {matrix = "resin", fibre'),
+        ({1: "resin", 2: "glass"}, {}, ("matrix", "glass"), 'add to [cell]: phases = {matrix = "resin"}.'),
+        ({1: "resin", 2: "E 1"}, {}, ("matrix", "glass"), 'phases = {matrix = "resin", glass = "E 1"}.'),
+        ({1: "matrix", 2: "E 1"}, {}, (), 'are fibres, add to [cell]: phases = {fibre = "E 1"}.'),
+    ],
+)
+def test_phases_that_are_proposed_read_the_mesh(tmp_path, names, phases, materials, proposed):
+    replace(grid(), names=names).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as error:
+        read(tmp_path / "a.msh", phases=phases, materials=materials)
+    fault = error.value.faults[-1]
+    assert proposed in fault and all(f'"{name}"' in fault.partition("the file has")[2] for name in names.values())
+    entries = tomllib.loads(re.search(r"phases = \{.*?\}", fault)[0])["phases"]
+    read(tmp_path / "a.msh", phases={name: (group,) for name, group in entries.items()})
+
+
+@pytest.mark.parametrize(
+    ("names", "phases", "fault"),
+    [
+        ({}, {"matrix": (1,), "glass": (2,), "carbon": (2,)}, "carbon = 2: also in glass; expected each group in one"),
+        (NAMES, {"matrix": (1,), "a": ("E-Glass",), "b": ("e-glass",)}, 'b = "e-glass": also in a; expected each'),
+        (NAMES, {"matrix": (1,), "a": ("E-Glass",), "b": (2,)}, "is in 2 physical surfaces: a, b; [cell.phases] names"),
+    ],
+)
+def test_a_group_in_two_phases_is_refused(tmp_path, names, phases, fault):
+    replace(grid(), names=names).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError, match=re.escape(fault)):
+        read(tmp_path / "a.msh", phases=phases)
