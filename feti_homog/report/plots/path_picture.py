@@ -61,7 +61,8 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
     curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
-    largest = landmarks.name_of(document, peak).replace(landmarks.LARGEST, f"{landmarks.LARGEST}, no peak yet,")
+    largest = landmarks.name_of(document, peak)
+    largest += ", no peak yet," * (largest == landmarks.LARGEST and peak["event"] == len(points) - 1)
     for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
         names = [title.replace("_", " ").strip() or largest for title in titles]
