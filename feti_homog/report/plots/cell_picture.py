@@ -226,7 +226,7 @@ def deformed(
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     if reported(document).name == "conductivity":
         title = rf"$\partial T / \partial x_{component[1]} = 1$"
-        bar.set_label(f"$-q_{component[1]}$ (unit of k times that of the gradient)")
+        bar.set_label(f"$-q_{component[1]}$ (k times gradient)")
         caption = f"$T$ every {draw_levels(axes, state, drawn):g}"
         line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
     elif is_axial(state):
