@@ -110,7 +110,8 @@ def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[
         for number, arc in enumerate(interface.debonded):
             angle = "[angle] values" if arc.angle is None else f"angle {arc.angle:g}"
             chosen = "all" if isinstance(arc.fibre, str) else ", ".join(str(records[k - 1]) for k in arc.fibre)
-            yield f"arc        [{label}] debonded[{number}]: {angle} about {arc.centre:g} degrees, fibre {chosen}"
+            tips = ", tips at the next nodes outside" if case.cell.has_own_mesh else ""
+            yield f"arc        [{label}] debonded[{number}]: {angle} about {arc.centre:g} degrees{tips}, fibre {chosen}"
     if case.cell.mix is not None:
         phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii
         mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]

@@ -131,8 +131,7 @@ def _points(
         stress = np.asarray(context.loads.means(responses)["stress"])
         names, acting = voigt.voigt_names(len(stress))[1], path_curves.components_above(path_curves.ZERO, stress[None])
         large = [f", {names[component]} {stress[component]:.6g}" for component in acting]
-        place = f" beyond the last point{''.join(large)}"
-        context.checks.faults.append(str(_with_advice(error, place, path)))
+        context.checks.faults.append(str(_with_advice(error, f" beyond the last point{''.join(large)}", path)))
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:

@@ -13,7 +13,7 @@ from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
-ENERGY = f"{records.STRESS} times that of the cell"
+ENERGY = "stress times length"
 CONDUCTIVITY = "conductivity"
 PER_DEGREE = f"{records.STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"

@@ -209,8 +209,7 @@ class Homogenization:
         if self.cell.summary.across:  # without multipliers no bond can break
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
-        sums = self.cell.comm.allreduce(numbers)
-        return dict(zip(("bonded", "open", "closed"), sums.tolist(), strict=True))
+        return dict(zip(("bonded", "open", "closed"), self.cell.comm.allreduce(numbers).tolist(), strict=True))
 
     @cached_property
     def _strain_of_jumps(self) -> Float:

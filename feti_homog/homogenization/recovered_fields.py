@@ -11,9 +11,10 @@ import numpy as np
 
 from feti_homog.fem import Problem, stress_recovery
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.averaging import FibreInterfaces, Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.interface.contact import Contact
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.typing import Float
 
@@ -112,11 +113,12 @@ def error_shares(cell: TornCell, response: Response) -> Float:
 
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
-    """Name the places at which stresses of plane states would grow without limit on finer meshes."""
-    rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
-    tips = rigid and any(plane is not None and plane.debonded > 0 < plane.counts["bonded"] for plane in states)
-    places = {"corners of fibres": cell.summary.has_corners, "tips of debonding": tips}
-    return {name for name, exists in places.items() if exists}
+    """Name the places at which stresses of plane states would grow without limit on finer meshes.  Collective."""
+    places = {"corners of fibres"} if cell.summary.has_corners else set[str]()
+    if any(bond.normal_stiffness is None for bond in cell.case.interfaces):
+        length, masks = FibreInterfaces(cell).length, [s.state.status == Contact.BONDED for s in states if s]
+        places |= {"tips of debonding" for bonded in masks if np.minimum(length(bonded), length(~bonded)).any()}
+    return places
 
 
 def _stresses(

@@ -130,8 +130,7 @@ def can_be_torn_by_tiles(
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
         return False
     triangles = element_estimate.ElementEstimate.of(case.cell, noded.arrangement).triangles
-    dofs = round(triangles * lattice.intervals**2)
-    return not (policy.across_pieces(dofs, 1) and can_be_cut_across(case))
+    return not (policy.across_pieces(round(triangles * lattice.intervals**2), 1) and can_be_cut_across(case))
 
 
 def tear_by_tiles(

@@ -46,8 +46,9 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path.
 
     The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points without such a
-    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  The entry
-    `so_far` marks a path that is unfinished, or stopped early without a fall.
+    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  Falls by less
+    than `LEAST_FALL`, and all falls of an unfinished path, count only after the largest stress.  The entry `so_far`
+    marks a path that is unfinished, or stopped early without a fall.
 
     On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
@@ -66,7 +67,9 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
-    falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
+    breaks = [(a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
+    share = np.inf if "unfinished" in document else LEAST_FALL
+    falls = [(size[a] - size[b], a, b) for a, b in breaks if a == size.argmax() or 1 - size[b] / size[a] >= share]
     _, top, valley = max(falls, default=(0.0, len(size), None))
     event = int(number[size[: top + 1].argmax()])
     names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
@@ -140,8 +143,7 @@ def marks(document: path_curves.Document) -> dict[int, str]:
     largest = name_of(document, peak)
     places = {"first softening": "first_softening_event", "first break": "first_break_event"}
     places |= {largest: "event", f"after the {largest}": "event_left"}
-    entries = {title: peak[name] for title, name in places.items() if name in peak}
-    entries["end"] = len(document["path"]) - 1
+    entries = {title: peak[name] for title, name in places.items() if name in peak} | {"end": len(document["path"]) - 1}
     numbers = sorted({int(number) for number in entries.values()})
     return {number: " and ".join(title for title, place in entries.items() if place == number) for number in numbers}
 
@@ -158,13 +160,11 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
             marked points if they all fit, points around the deepest drops for half the rest, and evenly spaced points.
         legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
     """
-    if states == "all" or not points:
+    if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
         return list(range(len(points)))
     ends, around = {0, len(points) - 1}, drops(points, legs)
     if isinstance(states, str):
         return sorted(ends.union(marked, *(drop[1:] for drop in around)))
-    if len(points) <= states:
-        return list(range(len(points)))
     chosen = ends.union(marked) if len(ends.union(marked)) <= states else ends
     room = len(chosen) + (states - len(chosen)) // 2
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):

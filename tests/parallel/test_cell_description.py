@@ -1,6 +1,7 @@
 """`check` describes the solver that a run makes."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 from support.base_case import changed
@@ -11,6 +12,8 @@ from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.petsc.options_database import case_options
 from feti_homog.system.runtime.standard_streams import Progress
+
+MESHES = Path(__file__).parents[2] / "meshes"
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -82,3 +85,10 @@ def test_the_fibres_of_arcs_are_named_by_number_row_and_centre(comm):
         "arc        [interface] debonded[1]: angle 30 about 0 degrees, fibre all",
         f"arc        [interface] debonded[2]: angle 0 about 0 degrees, fibre {first}, {second}",
     ]
+
+
+def test_arcs_in_a_mesh_of_the_user_end_at_its_nodes(comm):
+    case = tomllib.loads(changed(end=ARCS)) | {"cell": {"geometry": "mesh", "file": str(MESHES / "square.msh")}}
+    case["interface"] = {"debonded": [{"fibre": 1, "centre": 40.0, "angle": 81.0}]}
+    words = "angle 81 about 40 degrees, tips at the next nodes outside, fibre 1 ("
+    assert words in comm.bcast(describe(Case.parse(case), comm))

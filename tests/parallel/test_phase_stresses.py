@@ -139,6 +139,10 @@ def test_stresses_rise_beside_tips_and_corners(comm):
 
     arc = {"interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}]}}
     assert "beside tips of debonding rise without limit with finer elements" in remarks(CELL, **arc)
+    two = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.3}
+    for angle in (90.0, 360.0):  # one fibre of two: without any bond it has no tips
+        arc = {"interface": {"debonded": [{"fibre": 1, "centre": 0.0, "angle": angle}]}}
+        assert ("beside tips of debonding" in remarks(two, **arc)) == (angle < 360.0)
     assert "they rise" not in remarks(CELL)
 
 

@@ -18,7 +18,7 @@ OF_UNITS = {
     "1 / unit of the moduli": (-1, 0, 0),
     "unit of the cell": (0, 1, 0),
     "unit of the cell squared": (0, 2, 0),
-    "unit of the moduli times that of the cell": (1, 1, 0),
+    "stress times length": (1, 1, 0),
     "unit of the moduli per unit of temperature": (1, 0, -1),
     "1 / temperature": (0, 0, -1),
     "1 / unit of temperature": (0, 0, -1),

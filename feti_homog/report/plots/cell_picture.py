@@ -126,10 +126,8 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
     # Means at the nodes of each body do not show where the body is cut.
     values = np.maximum(np.exp(decimation.node_means(np.log(np.maximum(density, lowest)), drawn)), lowest)
     plot_helpers.shade_triangles(axes, drawn, drawn.points, values, colours.norm, colours.cmap)
-    extend = "both" if highest > top else "min"
-    bar = drawn_cell.bar_beside(axes, colours, extend)
-    letters = int((picture.get_figheight() - 1.2) / 0.075)
-    bar.set_label(fill("local error / mean energy (both per area)", letters))
+    bar = drawn_cell.bar_beside(axes, colours, "both" if highest > top else "min")
+    bar.set_label(fill("local error / mean energy (both per area)", int((picture.get_figheight() - 1.2) / 0.075)))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh (dark: large)"))
@@ -226,7 +224,7 @@ def deformed(
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     if reported(document).name == "conductivity":
         title = rf"$\partial T / \partial x_{component[1]} = 1$"
-        bar.set_label(f"$-q_{component[1]}$ (unit of k times that of the gradient)")
+        bar.set_label(f"$-q_{component[1]}$ (k times gradient)")
         caption = f"$T$ every {draw_levels(axes, state, drawn):g}"
         line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
     elif is_axial(state):
@@ -243,8 +241,7 @@ def deformed(
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
     marks = cell.interface.mark(axes, moved, state)
     drawn_cell.label_cell_axes(axes, attributes)
-    handles = [*(marks if len(marks) > 1 else ()), line]
-    plot_helpers.legend_below(figure, handles, 3)
+    plot_helpers.legend_below(figure, [*(marks if len(marks) > 1 else ()), line], 3)
     axes.set_title(_title(attributes, title))
     return figure
 

@@ -199,7 +199,8 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
     if OWN_COLOURS in cell.marks.values():
-        cell.bar(grid[len(numbers) - 1], shapes[-1])
+        below = grid[len(numbers) - 1].inset_axes((0.0, -0.12, 1.0, 0.05))  # beside it, columns would be uneven
+        figure.colorbar(shapes[-1], below, extend=shapes[-1].cmap.colorbar_extend, orientation="horizontal")
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.03)
     bar.locator = MaxNLocator(6)
     bar.ax.set_title("before" if OWN_COLOURS in cell.marks.values() else "")

@@ -61,7 +61,8 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
     curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
-    largest = landmarks.name_of(document, peak).replace(landmarks.LARGEST, f"{landmarks.LARGEST}, no peak yet,")
+    largest = landmarks.name_of(document, peak)
+    largest += ", no peak yet," * (largest == landmarks.LARGEST and peak["event"] == len(points) - 1)
     for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
         names = [title.replace("_", " ").strip() or largest for title in titles]
@@ -133,7 +134,7 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
             axes.step(strain[rising], count[rising], where="pre", **line, linewidth=1.8)
     if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
         damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]
-        axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged, by length")
+        axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged share × nodes")
     axes.set_ylabel("interface\nnodes")
     axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
 
@@ -147,7 +148,7 @@ def _records(document: Document) -> Array | None:
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Label the points `numbers` on a curve (points, 2) by pointers.  Labels lie where there is most room."""
+    """Label points `numbers` on a curve (points, 2) by pointers, where most room is; crowded ones stay unlabelled."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     style |= {"textcoords": "offset points", "arrowprops": pointer}
@@ -159,13 +160,15 @@ def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
     places = scale * axes.transData.transform(curve)
     positions = np.linspace(0, len(curve) - 1, 20 * len(curve))
     line = np.column_stack([np.interp(positions, range(len(curve)), column) for column in places.T])
-    texts = np.full((1, 2), -1e9)
+    texts, shape = np.full((1, 2), -1e9), np.array([0.5, 1.0])  # numbers are wider than high
     for number in numbers:
         sides = places[number] + offsets
-        room = np.minimum(np.minimum(cdist(sides, line).min(axis=1), cdist(sides, texts).min(axis=1) / 2.0), 9.0)
+        apart = cdist(sides * shape, texts * shape).min(axis=1) / 2.0
+        room = np.minimum(np.minimum(cdist(sides, line).min(axis=1), apart), 9.0)
         best = (room - 99.0 * ((sides < low) | (sides > high)).any(axis=1)).argmax()
-        texts = np.append(texts, sides[[best]], axis=0)
-        axes.annotate(str(number), curve[number], offsets[best].tolist(), **style)
+        if apart[best] >= 6.0:
+            texts = np.append(texts, sides[[best]], axis=0)
+            axes.annotate(str(number), curve[number], offsets[best].tolist(), **style)
 
 
 def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
@@ -239,5 +242,4 @@ def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None
         return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
     values, load = values[rising], load[rising]
     start = np.append(0.0, load[:-1] / load[1:])
-    shares = start[:, None] + (1.0 - start[:, None]) * STEPS
-    return np.asarray(values[:, None] * shares**power).ravel()
+    return np.asarray(values[:, None] * (start[:, None] + (1.0 - start[:, None]) * STEPS) ** power).ravel()

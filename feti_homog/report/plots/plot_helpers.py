@@ -93,7 +93,8 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
     By default pictures have no white margins.  Raises FetiHomogError if the file cannot be written.
     """
     if look.title is not None:
-        figure.suptitle(plain(look.title)) if figure.get_suptitle() else figure.axes[0].set_title(plain(look.title))
+        set_title: Any = figure.suptitle if figure.get_suptitle() else figure.axes[0].set_title
+        set_title(plain(look.title)).set_in_layout(bool(look.title))  # without a band for an empty title
     for text in [*figure.texts, *(axes.title for axes in figure.axes)]:
         text.set_wrap(True)
     file, box = path.with_suffix(f".{look.format}"), "tight" if look.size is None else None

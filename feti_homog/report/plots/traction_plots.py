@@ -58,8 +58,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
         for axes in row[2:]:
             axes.set(ylabel="damage", ylim=(-0.03, 1.03))
         fibre_name = f"fibre {file['interface/fibre_number'][along.nodes[0]]}"
-        is_fibre = body in file["fibre/body"][:]
-        row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", loc="left")
+        row[0].set_title(fibre_name if body in file["fibre/body"][:] else f"coating of {fibre_name}", loc="left")
         for axes in row if stacked else ():
             axes.set_title(f"{axes.get_title('left')} {axes.get_ylabel()}".strip(), loc="left")
             axes.set_ylabel("")
@@ -187,7 +186,8 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     best = np.arange(len(nodes)), (distance + SAME_PLACE * length * fraction).argmin(axis=1)
     at = before[nearest[best]] + (fraction * length)[best]
     order, unit = np.argsort(at, kind="stable"), plot_helpers.unit_label(file.attrs["length_unit"])
-    label = f"arc length, counterclockwise {unit or '(cell units)'}"
+    origin = " from normal $x_1$" if all(line[0] == line[-1] for line in lines) else ""
+    label = f"arc length{origin}, counterclockwise {unit or '(cell units)'}"
     return Coordinate(of_body[order], at[order], (0.0, float(before[-1])), label, False)
 
 

@@ -60,7 +60,7 @@ def conductivity(document: Document) -> list[Table]:
     ]  # fmt: skip
     if (forms := document.get("conductivity_estimates")) is not None:
         rows = [["along: mean", UNKNOWN, k[2][2], UNKNOWN, forms["axial"]]]
-        for label, key in (("Wiener", "wiener"), ("Hashin-Shtrikman", "hashin_shtrikman")):
+        for label, key in (("Wiener", "wiener"), ("isotropic Hashin-Shtr.", "hashin_shtrikman")):
             lower, upper = forms.get(key) or (None, None)
             rows += [[f"{name} {label}", lower, k[i][i], upper, UNKNOWN] for i, name in enumerate(names[:2]) if lower]
         if forms.get("maxwell") and not forms.get("hashin_shtrikman"):  # for bonded fibres, one of these bounds

@@ -54,13 +54,13 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
     largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
     noun = document["case"]["path"]["method"].removesuffix("s")
-    leg_of, fall = path_curves.legs_of(document), landmarks.fall_of(document, peak)
+    leg_of = path_curves.legs_of(document)
     curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
-    at_end = peak["event"] == np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
+    end = np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
-    text = begins.get(largest, f"{name} at the end of {curve}, no peak yet" if at_end else f"Largest {name}")
-    text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
-    text += f" ({_place(peak, '', noun)})"
+    text = f"{name} at the end of {curve}, no peak yet" if peak["event"] == end else f"Largest {name}"
+    text = begins.get(largest, text)
+    text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g} ({_place(peak, '', noun)})"
     for title in ("first_softening_", "first_break_"):
         if f"{title}event" in peak:
             first, at = peak[f"{title}stress"], peak[f"{title}strain"]
@@ -73,7 +73,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
     if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
-    text += f"; {curve} ends near its peak, {fall:.1%} below it" * (largest == landmarks.LARGEST and not at_end)
+    if largest == landmarks.LARGEST and peak["event"] != end:
+        text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
@@ -101,9 +102,8 @@ def _path_energies(document: Document, label: str) -> list[str]:
     The lines give the work of the loads, the energy stored at the end, the energy lost by breaks along all equilibria
     and under a rising load, frictional heat and fracture energy if any, and the debonded fraction.
     """
-    points, legs = document["path"], path_curves.legs(document)
-    last = points[-1]
-    where = " on the first leg" if legs > 1 else ""
+    points, last = document["path"], document["path"][-1]
+    where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
     lines = [
         f"Work per area{label}: {last['work']:.6g}",
@@ -112,8 +112,7 @@ def _path_energies(document: Document, label: str) -> list[str]:
     ]
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
-        places = [point["load_factor"] * legs for point in points]
-        ends = [p for p, at in zip(points, places, strict=True) if abs(at - round(at)) < path_curves.SAME_LOAD]
+        ends = [points[number] for number in path_curves.ends_of_legs(document)]
         for point in reversed(ends[:-1]):
             pair = np.array([point["strain"], ends[-1]["strain"]])
             if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():  # a closed loop

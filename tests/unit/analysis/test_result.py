@@ -192,7 +192,7 @@ def test_tips_are_records_and_no_cells_of_a_table(tmp_path):
     assert RESULTS["angle"].angle[0].tips is None and "tips" not in RESULTS["angle with tips"].points
     assert "tips" not in result_json.write_csv(tmp_path / "table.csv", RESULTS["angle with tips"].angle).read_text()
     by_path = {key.path: key for key in schema_keys()}
-    assert by_path["tips.G"].unit == by_path["angle[].tips.G"].unit == "unit of the moduli times that of the cell"
+    assert by_path["tips.G"].unit == by_path["angle[].tips.G"].unit == "stress times length"
 
 
 def test_results_can_be_told_apart():

@@ -79,6 +79,16 @@ def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
     assert (found["event"], found["event_left"], found["stress"]) == (0, 3, pytest.approx(2.0))
 
 
+def test_a_small_early_fall_of_events_is_no_peak_of_a_path_that_rises_beyond() -> None:
+    """At load 0.5 the stress falls by 3 %, then by 10 %, on branches that carry more in the end."""
+    for stiffness, event in ((9.7, 2), (9.0, 0)):
+        points = [point(0.5, 10.0), point(0.48, stiffness), point(1.0, stiffness, 0)]
+        path = document("events", 1, points)
+        peak = peak_of(path)
+        assert peak["event"] == event and ("event_left" in peak) == (event == 0)
+        assert marks(path)[event] == ("first break and peak" if event == 0 else "largest stress and end")
+
+
 def test_rising_strain_is_that_of_the_first_leg() -> None:
     points = [point(load, 1.0) for load in (0.2, 0.5, 0.6, 1.0)]
     assert [first_leg(document("events", n, points)) for n in (1, 2, 3)] == [4, 2, 1]

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import PathPatch
 from support.sample_output import Sample, sample
 
-from feti_homog.report.plots import cell_picture, deformed_panels, drawn_cell, plot_helpers
+from feti_homog.report.plots import cell_picture, deformed_panels, drawn_cell, path_picture, plot_helpers
 from feti_homog.report.text import tables
 from feti_homog.results.field_file import FieldFile
 
@@ -64,6 +64,49 @@ def test_titles_of_panels_leave_the_title_of_the_figure_free(tmp_path: Path, mon
         title = figure._suptitle.get_window_extent(renderer)  # type: ignore[attr-defined]
         boxes = [axes.title.get_window_extent(renderer) for axes in figure.axes if axes.get_title()]
     assert len(boxes) >= 3 and not any(title.overlaps(box) for box in boxes)
+
+
+def test_columns_of_panels_are_even_if_the_end_has_colours_of_its_own(tmp_path: Path, monkeypatch: Any) -> None:
+    whole, document = sample(4), json.loads(json.dumps(PATH)) | {"path": POINTS[:1] * 5}
+    first = whole.states[0]
+    states = [replace(first, point=k, stress=first.stress * (1.0 if k < 4 else 10.0)) for k in range(5)]
+    monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda _: dict.fromkeys(range(4), "peak") | {4: "end"})
+    monkeypatch.setattr(deformed_panels, "_grid", lambda *_: (2, 3))
+    with h5py.File(written(tmp_path, replace(whole, states=tuple(states)))) as file:
+        figure = deformed_panels.panels(file, document, 1.0)
+    panels = [axes for axes in figure.axes if axes.get_title().startswith(("peak", "end"))]
+    assert len(panels) == 5 and any("own colours" in axes.get_title() for axes in panels)
+    left = [axes.get_position().x0 for axes in panels[:3]]
+    assert left[2] - left[1] == pytest.approx(left[1] - left[0], rel=0.02)
+    (bar,) = panels[4].child_axes
+    (canvas := FigureCanvasAgg(figure)).draw()
+    renderer: Any = canvas.get_renderer()
+    assert bar.get_tightbbox(renderer).y1 < panels[4].get_window_extent(renderer).y0
+
+
+@pytest.mark.parametrize("title", ["", "one"])
+def test_an_empty_title_takes_no_room(tmp_path: Path, title: str) -> None:
+    look = plot_helpers.Look(title=title)
+    for has_own in (True, False):
+        figure = look.figure(4.0, 3.0)
+        axes = figure.subplots()
+        own = figure.suptitle("own") if has_own else axes.set_title("own")
+        plot_helpers.save(figure, tmp_path / "picture.png", look)
+        assert own.get_text() == title and own.get_in_layout() == bool(title)
+
+
+def test_crowded_points_have_no_numbers() -> None:
+    axes = plot_helpers.PLAIN.figure(7.0, 4.0).subplots()
+    place = np.linspace(0.0, 1.0, 2001)
+    curve = np.column_stack([place, place * (1.0 - place)])
+    axes.plot(*curve.T)
+    path_picture._number_points(axes, curve, [0, *range(1000, 1010), 2000])
+    numbers = [int(text.get_text()) for text in axes.texts]
+    assert {0, 1000, 2000} <= {*numbers} and len(numbers) < 8
+    (canvas := FigureCanvasAgg(axes.figure)).draw()  # type: ignore[arg-type]
+    renderer: Any = canvas.get_renderer()
+    boxes = [text.get_bbox_patch().get_window_extent(renderer) for text in axes.texts]  # type: ignore[union-attr]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
 
 
 def test_drawings_leave_the_common_colours_without_listeners(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def test_each_picture_has_the_flux_along_its_own_gradient(solved):
             (axes,) = cell_picture.deformed(cell, state, result.document, plot_helpers.PLAIN).axes
             (bar,) = axes.child_axes
             assert rf"$\partial T / \partial x_{i + 1} = 1$" in axes.get_title()
-            assert bar.get_ylabel() == f"$-q_{i + 1}$ (unit of k times that of the gradient)"
+            assert bar.get_ylabel() == f"$-q_{i + 1}$ (k times gradient)"
             flux = next(shapes for shapes in axes.collections if shapes.get_array() is not None).get_array()
             weights = cell.drawn.node_areas / cell.drawn.node_areas.sum()
             assert weights @ np.ravel(flux) == pytest.approx(result.effective_conductivity[i, i], rel=0.02)
@@ -51,6 +51,7 @@ def test_bounds_stand_beside_the_conductivity_that_they_bound():
     numbers = [[float(each) for each in row[1:] if each.strip("- ")] for row in bounds.cells]
     across = [[low, k[i, i], high] for low, high in (forms["wiener"], forms["hashin_shtrikman"]) for i in (0, 1)]
     assert numbers == [[k[2, 2], 9.5], *across]
+    assert [row[0] for row in bounds.cells[-2:]] == ["x1 isotropic Hashin-Shtr.", "x2 isotropic Hashin-Shtr."]
     *_, bounds = conductivity(document | {"conductivity_estimates": {"axial": 9.5, "maxwell": 2.75}})
     label, *row = bounds.cells[-1]
     assert label == "across: Maxwell" and [float(each) for each in row if each.strip("- ")] == [3.0, 2.75]

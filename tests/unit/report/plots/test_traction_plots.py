@@ -62,7 +62,7 @@ def found(path: Path, number: int, limit: int) -> tuple[Coordinate, Any]:
 def test_flat_faces_have_an_arc_length(tmp_path: Path, limit: int) -> None:
     """Counterclockwise around the square of length 2, from the first node whose normal is nearest to x1."""
     place, points = found(write(tmp_path, around(sample(4, refine=1), 4, 2)), 2, limit)
-    assert place.label.startswith("arc length") and place.ends == pytest.approx((0.0, 2.0))
+    assert place.label.startswith("arc length from normal $x_1$, counter") and place.ends == pytest.approx((0.0, 2.0))
     np.testing.assert_allclose(place.values, np.arange(16) / 8, atol=1e-12)
     along = points[place.nodes]
     np.testing.assert_allclose(np.linalg.norm(np.diff(along, axis=0), axis=1), 0.125)
@@ -74,6 +74,7 @@ def test_flat_faces_have_an_arc_length(tmp_path: Path, limit: int) -> None:
 def test_open_ends_of_an_interface_have_an_arc_length_too(tmp_path: Path) -> None:
     """Two sides of the sample's fibre are interfaces."""
     place, points = found(write(tmp_path, sample(8)), 1, 100_000)
+    assert place.label.startswith("arc length, counter")
     np.testing.assert_allclose(place.values, [0, 0.125, 0.25, 0.375, 0.5, 0.5, 0.625, 0.75, 0.875, 1.0], atol=1e-12)
     for rows in (place.nodes[:5], place.nodes[5:]):
         upper = points[rows[0], 1] > 0.5

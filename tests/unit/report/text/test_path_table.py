@@ -48,6 +48,12 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
         ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2); later up to 90 "
          "(increment 3)", "peak"),
         ([10, 20, 30], 0, "S11 at the end of the path, no peak yet: 30 at", "(increment 2)", "largest stress and end"),
+        # Small early falls are saw teeth of a path that rises beyond them, and the end counts, not the valley.
+        ([50, 60, 58, 104], 1, "S11 at the end of the path, no peak yet: 104 at", "(increment 0)",
+         "largest stress and end"),
+        ([50, 60, 58, 104, 100, 102], 1, "Largest S11: 104 at", "; then falls by 3.8% to 100 (increment 4); the path "
+         "ends near its peak, 1.9% below it", "largest stress"),
+        ([50, 60, 58, 104, 30, 50, 49], 1, "Peak S11: 104 at", "; then falls by 71.2% to 30 (increment 4)", "peak"),
         ([10, 30, -30], 0, "Peak S11: 30 at", "E11 = 0.00666667 (increment 1)", "peak"),
     ],
 )  # fmt: skip
@@ -57,3 +63,10 @@ def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, 
     words = " ".join(" ".join(_peak_lines(document, peak)).split())
     assert words.startswith(begins) and words.endswith(ends)
     assert marks(document)[peak["event"]].removeprefix("first break and ") == mark
+
+
+def test_an_unfinished_path_has_its_largest_stress_so_far_at_the_largest() -> None:
+    document = along([10.0, 60.0, 40.0, 90.0], 1) | {"unfinished": "by a limit"}
+    words = " ".join(" ".join(_peak_lines(document, peak_of(document))).split())
+    assert words.startswith("Largest S11 so far, the path being cut off: 90 at")
+    assert "; then" not in words and "; later" not in words
