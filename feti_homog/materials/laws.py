@@ -262,7 +262,7 @@ def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
         return ratio
     if shear is not None and ratio is None:
         return material.E_transverse / (2.0 * shear) - 1.0
-    raise ValueError("nu_transverse, G_transverse: expected one of them, and not both")
+    raise ValueError(f"nu_transverse, G_transverse: {'neither is' if ratio is None else 'both are'} given; expected one of the two")
 
 
 def _numbers(*constants: float | None) -> list[float]:
