@@ -241,8 +241,7 @@ def state_error(
     errors = [mesh_estimate.energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)
     size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
-    shares = [error.shares[:, 0] if keep else None for error in errors]
-    shared = [replace(response, shares=part) for response, part in zip(responses, shares, strict=True)]
+    shared = [replace(r, shares=e.shares[:, 0] if keep else None) for r, e in zip(responses, errors, strict=True)]
     return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
 
 

@@ -27,36 +27,30 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Follow the path of the case, and return its `Result` entries as `follow` does.  Collective."""
-    section = context.case.section
-    assert isinstance(section, load_sections.LoadPath)
-    return follow(context, section, criterion_of(context.cell, grows=True))
-
-
-def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw) -> dict[str, Any]:
-    """Follow a path and return its `Result` entries.  Collective.
+    """Follow the path of the case and return its `Result` entries.  Collective.
 
     `path` has a point for each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and
     `resumed` the number of points from the checkpoint.  Each new converged point is written to the checkpoint at once.
     """
+    path, law = context.case.section, criterion_of(context.cell, grows=True)
+    assert isinstance(path, load_sections.LoadPath)
     check_accuracy(context)
     count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
-    bonds = list[tuple[float, float]]()
+    bonds, top = list[tuple[float, float]](), ""
+    is_said = not any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # the load prescribes strains
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
-            place = f"at {point.load_factor:.6f}, {responses[0].leading}"
+            place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' * bool(before)}"
             if before is not None:
-                place += ", from the checkpoint"
-                all_equilibria, load_controlled, bond = before
-                work.resume_from(all_equilibria, load_controlled, point)
+                work.resume_from(*before[:2], point)
             else:
                 work.arrive(point)
-                bond = most_utilised_bond(context, law, point)
+            bonds.append(most_utilised_bond(context, law, point) if before is None else before[2])
             entries.append(entry := _entry(context, law, point, responses, work))
             if before is None and point.state.converged:
                 cell = context.loads.interfaces
-                event = path_events.stored(point, bond, responses, work, cell, _without_lists(entry))
+                event = path_events.stored(point, bonds[-1], responses, work, cell, _without_lists(entry))
                 context.checkpoint.write(number, *event)
                 line = f"{number + 1} points kept in {context.directory}: --resume goes on, plot and report show them"
                 standard_streams.remarks[:] = [line] * (context.directory is not None)
@@ -70,9 +64,14 @@ def follow(context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw)
             counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
             if (d := law.damage(point.state.bonds)) is not None:
                 counts += f", {context.cell.comm.allreduce(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
-            known = number == 0 or before is not None  # the first break takes much of the load, and no time
-            advance(point.load_factor, len(entries), counts, known)
-            bonds.append(bond)
+            is_known = number == 0 or before is not None  # the first break takes much of the load, and no time
+            advance(point.load_factor, len(entries), counts, is_known)
+            top = place if point.load_factor == work.largest_load else top
+            if not is_said and (is_said := point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load):
+                context.progress.say(
+                    f"  the load falls, after its largest value so far {top}; this path ends at 1, perhaps far away: "
+                    "a prescribed strain, such as [path] to = {E22 = 0.01}, ends it earlier"
+                )
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break

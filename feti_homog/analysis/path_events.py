@@ -36,24 +36,25 @@ class Work:
         load_controlled: loss if the load only rises on the first leg, as in a test.  A bond in a snap-back then
             breaks at the largest load t so far and loses (t / break load)^2 times the energy, because the response
             is homogeneous in the load.
+        largest_load: largest load factor so far.
     """
 
     all_equilibria: path_points.Energies = path_points.NO_ENERGIES
     load_controlled: float = 0.0
+    largest_load: float = 0.0
     _load: float = 0.0
-    _largest_load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
         """Add the energies between the previous point and `point`."""
         # Loads never fall after the first leg.
-        rise = self._largest_load / self._load if self._load else 1.0
+        rise = self.largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
     def resume_from(self, energies: path_points.Energies, load_controlled: float, point: path_points.Point) -> None:
         """Continue from a stored point, with the energies up to this point."""
         self.all_equilibria, self.load_controlled = energies, load_controlled
-        self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
+        self._load, self.largest_load = point.load_factor, max(point.load_factor, self.largest_load)
 
 
 def stored(

@@ -36,11 +36,13 @@ def shown(
 
     def advance(share: float, count: int, text: str, known: bool) -> None:
         nonlocal reached, next_line, since
-        now, reached = clock(), max(share, reached)  # the load falls in a snap-back
+        now, reached = clock(), max(share, reached)
         since = (now, reached, count) if known else since
         seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
         text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
-        if gain:  # first, since a narrow terminal shows the beginning
+        if share < reached:  # after a peak the load may fall for good
+            text = f"falls to {share:.0%}, {text}"
+        elif gain:  # first, since a narrow terminal shows the beginning
             text = f"{timedelta(seconds=round(min(seconds * (1.0 - reached) / gain, 1e9)))} left, {text}"
         if bar is not None:
             bar.set_postfix_str(text, refresh=False)

@@ -14,8 +14,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature and, with
     contact, `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
     """
-    bonds = context.bonds(None)
-    starts = context.loads.zero_multipliers()
+    bonds, starts = context.bonds(None), context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)

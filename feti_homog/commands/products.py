@@ -90,6 +90,6 @@ def _result_folder(arguments: argparse.Namespace) -> Path:
     if names == [case_folders.INDEX_FILE]:
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
-            f"`feti-homog collect {directory}` draws a sweep"
+            f"`feti-homog collect {directory}` makes tables of all cases"
         )
     raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")

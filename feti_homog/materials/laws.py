@@ -243,8 +243,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
     if isinstance(material, material_forms.TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
         nu12, nu13 = transverse_ratio(material), nu31 * E1 / E3
-        G12 = E1 / (2.0 * (1.0 + nu12))
-        moduli, ratios, shears = [E1, E1, E3], [nu12, nu13, nu13], [G13, G13, G12]
+        moduli, ratios, shears = [E1, E1, E3], [nu12, nu13, nu13], [G13, G13, E1 / (2.0 * (1.0 + nu12))]
     else:
         moduli = _numbers(material.E1, material.E2, material.E3)
         ratios = _numbers(material.nu12, material.nu13, material.nu23)
@@ -262,7 +261,7 @@ def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
         return ratio
     if shear is not None and ratio is None:
         return material.E_transverse / (2.0 * shear) - 1.0
-    raise ValueError("nu_transverse, G_transverse: expected one of them, and not both")
+    raise ValueError(f"nu_transverse, G_transverse: {'missing' if ratio is None else 'both given'}; expected one")
 
 
 def _numbers(*constants: float | None) -> list[float]:

@@ -196,7 +196,8 @@ def criterion(strength: PhaseStrength) -> str:
         if names_given == list(names):
             return title
     groups = "; ".join(f"{', '.join(names)} ({title})" for title, names in CRITERIA.items())
-    groups += ". With tension alone write principal, or add compression" if names_given == ["tension"] else ""
+    if len(names_given) == 1 and names_given[0].endswith("tension"):
+        groups += f". With {names_given[0]} alone write principal, or add the other keys of its criterion"
     raise ValueError(f"strength: {', '.join(names_given) or 'empty'}: expected the keys of one criterion: {groups}")
 
 

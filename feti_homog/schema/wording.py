@@ -12,8 +12,9 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion", "expansion_axial", "expansion_transverse")),
-    **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
-    "shear_strength": ("tangential_strength",),
+    **dict.fromkeys(("strength", "bond_strength"), ("normal_strength", "tangential_strength")),
+    **dict.fromkeys(("tensile_strength", "xt", "compressive_strength", "xc"), ("normal_strength", "strength")),
+    "shear_strength": ("tangential_strength", "strength"),
     **dict.fromkeys(("mu", "coefficient_of_friction", "friction_coefficient"), ("friction",)),
     **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness")),
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
@@ -52,8 +53,7 @@ def _line(value: object) -> str:
 
 def toml_key(name: str) -> str:
     """Return a key as in TOML, in quotes unless bare, cut off after LONGEST_VALUE characters."""
-    is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
-    return name if is_bare else toml_value(name)
+    return name if re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name) else toml_value(name)
 
 
 def dotted_key(path: Iterable[str]) -> str:

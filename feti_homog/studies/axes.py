@@ -79,9 +79,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
     if cases > types.MOST_ROWS:
         lines.append(f"[{sections.SWEEP}]: {cases} cases; expected at most {types.MOST_ROWS}")
     if not axes and not lines and settings.realisations is None:
-        lines.append(
-            f"[{sections.SWEEP}]: nothing varies; expected keys with {sections.AXIS_EXPECTED}, or realisations"
-        )
+        lines += [f"[{sections.SWEEP}]: nothing varies; expected keys with {sections.AXIS_EXPECTED}, or realisations"]
     faults += lines
     if lines:
         return [], settings
@@ -117,6 +115,7 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
     """Return the fault of an axis, or an empty string.  Sampled ranges need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
+        names += [f"{name}.{path[0]}" for name, table in sections.SECTIONS.items() if path[0] in keys.keys_of(table)]
         return f"unknown key; {wording.suggestion(path[0], names, {})}"
     if isinstance(value, list):
         return "" if value else "expected at least one value"

@@ -56,6 +56,7 @@ class Status(StrEnum):
 
 
 BEGUN = (Status.RUNNING, Status.INTERRUPTED)
+WITHOUT_RESULT = (Status.UNCONVERGED, Status.FAILED, Status.DAMAGED)
 
 
 @dataclass(frozen=True)
@@ -260,3 +261,13 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]
     return lines
+
+
+def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
+    """Return warnings and remarks, one for all that agree up to a colon, with first case and number of cases."""
+    cases: dict[tuple[str, str], list[str]] = {}
+    for kind in ("warning", "remark"):
+        for entry, state in zip(entries, states, strict=True):
+            for line in (state.document or {}).get(f"{kind}s", ()):
+                cases.setdefault((kind, line.partition(": ")[0]), []).append(f"{kind}: {entry.folder}: {line}")
+    return [f"{lines[0]} ({len(lines)} cases)" if len(lines) > 1 else lines[0] for lines in cases.values()]

@@ -75,12 +75,9 @@ def run_all(
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
-        done, first = sum(state.status is case_folders.Status.DONE for state in states), dict[str, str]()
-        for entry, state in zip(sweep.entries, states, strict=True):
-            for line in (state.document or {}).get("warnings", ()):  # one for each setting, the text before the colon
-                first.setdefault(line.partition(": ")[0], f"warning: {entry.folder}: {line}")
+        done = sum(state.status is case_folders.Status.DONE for state in states)
         total = f"{done} of {len(states)} cases done; `feti-homog collect {directory}` makes tables of them"
-        standard_streams.say("\n".join([*first.values(), total]))
+        standard_streams.say("\n".join([*case_folders.note_lines(sweep.entries, states), total]))
     if failed:
         if comm.rank == 0:
             standard_streams.say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))

@@ -41,15 +41,12 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
         paths += draw_moduli(directory, table)
     counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
-    failed = [
-        (entry, state)
-        for entry, state in zip(index.entries, states, strict=True)
-        if state.status.is_failure or state.status is case_folders.Status.DAMAGED
-    ]
-    failures = case_folders.failure_lines(failed, index.stress_unit)
+    failed = [(e, s) for e, s in zip(index.entries, states, strict=True) if s.status in case_folders.WITHOUT_RESULT]
+    lines = [*case_folders.failure_lines(failed, index.stress_unit), *means(table)]
+    lines += case_folders.note_lines(index.entries, states)
     rows = zip(table.folder, table.status, table.reason, strict=True)
     begun = [f"  {folder}  {status}; {reason}" for folder, status, reason in rows if status in case_folders.BEGUN]
-    return [f"{len(table.status)} cases: {counts}", *begun, *failures, *means(table), *map(str, paths)]
+    return [f"{len(table.status)} cases: {counts}", *begun, *lines, *map(str, paths)]
 
 
 def means(table: SweepTable) -> list[str]:
@@ -57,7 +54,7 @@ def means(table: SweepTable) -> list[str]:
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names
-    names = [name for name in names if name in shown and not re.match(r"C\d|onset", name)] or names
+    names = [name for name in names if name in shown and not re.match(r"C\d|onset_[^S]", name)] or names
     columns = [tables.Column("output", -22), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
     columns += [tables.Column("std"), tables.Column("95 % +-")]
     lines, values = list[str](), list[list[Any]]()
@@ -118,7 +115,6 @@ def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseSta
     in_names = numbers(row.get("analysis.plane") for row in inputs)
     shown = (case_folders.Status.DONE, *case_folders.BEGUN)
     rows = [outputs(s.document, in_names) if s.document and s.status in shown else {} for s in states]
-    columns = _columns(rows, np.nan)
     return SweepTable(
         name=index.name,
         stress_unit=index.stress_unit,
@@ -126,7 +122,7 @@ def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseSta
         status=[state.status for state in states],
         reason=[state.reason for state in states],
         inputs=_columns(inputs, None),
-        outputs={name: np.array(values) for name, values in columns.items()},
+        outputs={name: np.array(values) for name, values in _columns(rows, np.nan).items()},
         documents=documents,
     )
 

@@ -165,11 +165,7 @@ OUTPUT_COLUMNS = (
     Column("anisotropy_normal", records.STRESS, "C11 - C22"),
     Column("anisotropy_shear", records.STRESS, "C33 - (C11 + C22 - 2 C12) / 4; in generalized plane strain C66 - ..."),
     *result_json.columns(engineering_constants.Moduli),
-    *(
-        column
-        for column in result_json.columns(engineering_constants.EngineeringConstants)
-        if column.name not in MODULI
-    ),
+    *(c for c in result_json.columns(engineering_constants.EngineeringConstants) if c.name not in MODULI),
     *result_json.columns(engineering_constants.TransverseIsotropy),
     Column("NAME_mesh_error", "that of NAME", "estimated mesh error of an entry or constant"),
     Column("energy_mesh_error", "", "largest estimated relative error of the strain energy under any strain"),

@@ -61,10 +61,15 @@ def test_known_steps_have_no_part_in_rate_and_time_left():
 
 
 def test_a_snap_back_leaves_the_share():
-    """The share is the largest load so far; without progress the time left is unknown."""
+    """The share is the largest load so far; while the load is below it the time left is unknown."""
     assert shown_lines([0.4, 0.1, 0.2], 60.0, known=1) == [
-        "  load 40%, 0:01:00 used, 2 events, 1.0 a minute",
-        "  load 40%, 0:02:00 used, 3 events, 1.0 a minute",
+        "  load 40%, 0:01:00 used, falls to 10%, 2 events, 1.0 a minute",
+        "  load 40%, 0:02:00 used, falls to 20%, 3 events, 1.0 a minute",
+    ]
+    assert shown_lines([0.4, 0.2, 0.8], 60.0) == [
+        "  load 40%, 0:01:00 used, 0:01:30 left, 1 events, 1.0 a minute",
+        "  load 40%, 0:02:00 used, falls to 20%, 2 events, 1.0 a minute",
+        "  load 80%, 0:03:00 used, 0:00:45 left, 3 events, 1.0 a minute",
     ]
 
 

@@ -75,6 +75,9 @@ FAULTY_MATERIALS: dict[str, str] = {
         ended('[material."fibre:2"]\nyoung = 1.0\npoisson = 0.2\n'),
     "[material.fibre] young: missing; expected a number above 0": cell("young = 200.0\n", ""),
     "[material.fibre] yuong = 200.0: unknown key; did you mean young?": cell("young = 200.0", "yuong = 200.0"),
+    "[material.fibre] tensile_strength = 4.9: unknown key; did you mean strength?":
+        cell("young = 200.0", "young = 200.0\ntensile_strength = 4.9"),
+    "[material.fibre] Xt = 4.9: unknown key; did you mean strength?": cell("young = 200.0", "young = 200.0\nXt = 4.9"),
     "[material.fibre] E = 200.0: unknown key; did you mean young?\nG = 82.0: unknown key; it follows from young":
         cell("young = 200.0", "E = 200.0\nG = 82.0"),
     "unknown key; did you mean normal_strength or tangential_strength?\n[interface] debonded: missing; ":
@@ -95,9 +98,9 @@ FAULTY_MATERIALS: dict[str, str] = {
         fibre(ORTHOTROPIC + OUT_OF_PLANE, "generalized"),
     "E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance":
         fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4") + "G13 = 1\nG23 = 1\n", "generalized"),
-    "[material.fibre] nu_transverse, G_transverse: expected one of them, and not both":
+    "[material.fibre] nu_transverse, G_transverse: missing; expected one":
         fibre("E_transverse = 14.0\nstrength = {von_mises = 3.0}\n", "stress"),
-    "[material.fibre] nu_transverse, G_transverse: expected one of them, and not":
+    "[material.fibre] nu_transverse, G_transverse: both given; expected one":
         fibre(TRANSVERSE + AXIAL + "G_axial = 15.0\nG_transverse = 7.0\n", "generalized"),
     "[material.fibre] G_transverse = 3.5: expected more than E_transverse/4 = 3.5; no material is stable otherwise":
         fibre("E_transverse = 14.0\nG_transverse = 3.5\n", "stress"),

@@ -115,6 +115,22 @@ def test_each_case_is_listed_by_its_status_and_done_ones_alone_count(tmp_path, m
     assert known == ["done", "running", "interrupted"] and table.statistics["peak_S11"].count == 1.0
 
 
+def test_notes_that_differ_in_numbers_alone_are_printed_once(tmp_path, monkeypatch):
+    """Each with its first case and the number of cases; warnings come first."""
+    notes = [["[cell] order = 1: 2.6% less", "utilisation"], ["[cell] order = 1: 0.9% less"], None]
+    documents = [lines and path_document(2, 0.0) | {"remarks": lines, "warnings": ["rtol"]} for lines in notes]
+    entries = tuple(case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k in (1, 2, 3))
+    status = [case_folders.Status.DONE, case_folders.Status.DONE, case_folders.Status.WAITING]
+    found = [case_folders.CaseState(*pair) for pair in zip(status, [""] * 3, documents, strict=True)]
+    index = case_folders.SweepIndex("test", "GPa", entries)
+    monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
+    assert [line for line in collect.collect(tmp_path, pictures=False) if "case-000" in line] == [
+        "warning: case-0001: rtol (2 cases)",
+        "remark: case-0001: [cell] order = 1: 2.6% less (2 cases)",
+        "remark: case-0001: utilisation",
+    ]
+
+
 def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
     """The third strain of the plane is the sixth of space."""
     plane = document(0.4, 8, 0.0)

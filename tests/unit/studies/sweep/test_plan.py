@@ -128,6 +128,10 @@ FAULTY = {
     "scalar": ("cell.order = 2", ["[sweep] cell.order = 2: expected a list of values"]),
     "no values": ("cell.order = []", ["expected at least one value"]),
     "unknown setting": ("realisation = 3", ["[sweep] realisation = 3: unknown key; did you mean realisations?"]),
+    "no section": (
+        "fibre_fraction = [0.2]",
+        ['[sweep] fibre_fraction = [0.2]: unknown key; did you mean "cell.fibre_fraction"?'],
+    ),
     "unknown section": ("cel.order = [1]", ["unknown key; did you mean cell?"]),
     "name": ("name = ['a']", ["[sweep] name"]),
     "backwards": ("cell.fibre_fraction = {from = 0.3, to = 0.1, step = 0.1}", ["expected numbers from < to"]),

@@ -61,7 +61,7 @@ def test_noise_and_costs_have_no_statistics(tmp_path, scale):
     count, *numbers = map(float, peak[2:])
     half = stats.t.ppf(0.975, 2) * scale / 3**0.5
     assert count == 3 and numbers == pytest.approx([4 * scale, scale, half], rel=1e-4)
-    assert {line.split()[0] for line in printed} == {"peak_S12", "peak_S22", "peak_E11"}
+    assert {line.split()[0] for line in printed} == {"onset_S12", "onset_S22", "peak_S12", "peak_S22", "peak_E11"}
 
 
 def test_numbers_so_far_of_an_unfinished_case_are_in_its_row_alone():
