@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from feti_homog.report.text.path_table import _peak_lines
+from feti_homog.report.text.path_table import _path_energies, _peak_lines
 from feti_homog.results.landmarks import marks, peak_of
 
 
@@ -70,3 +70,15 @@ def test_an_unfinished_path_has_its_largest_stress_so_far_at_the_largest() -> No
     words = " ".join(" ".join(_peak_lines(document, peak_of(document))).split())
     assert words.startswith("Largest S11 so far, the path being cut off: 90 at")
     assert "; then" not in words and "; later" not in words
+
+
+def test_the_last_closed_loop_of_friction_is_between_ends_of_legs() -> None:
+    """Up, down and up again, with two points at the second waypoint: the first and third leg end at one strain."""
+    document = along([1.0, 2.0, 1.0, 0.0, 0.1, 1.0, 2.0])
+    document["case"]["path"] = {"method": "increments", "waypoints": [[0.01, 0, 0], [0.0, 0, 0], [0.01, 0, 0]]}
+    strains, loads = (0.005, 0.01, 0.005, 0.0, 0.0, 0.005, 0.01), (0.5, 1.0, 1.5, 2.0, 2.0, 2.5, 3.0)
+    for k, (strain, load, point) in enumerate(zip(strains, loads, document["path"], strict=True)):
+        energies = {"stored": 0.0, "stored_in_springs": 0.0, "dissipated": 0.0, "dissipated_strain_controlled": 0.0}
+        counts = {"bonded": 0, "open": 0, "closed": 1, "debonded_share": 1.0, "friction_heat": 0.0}
+        point |= energies | counts | {"strain": [strain, 0.0, 0.0], "load_factor": load / 3, "work": 1.0 + k * k}
+    assert "area of the last closed loop 35" in " ".join(_path_energies(document, ""))
