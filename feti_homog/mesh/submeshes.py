@@ -20,8 +20,6 @@ ROWS = (
     ("touching", "class_keys"),
     ("at_void", "debonded", "edge_keys"),
 )
-# Other arrays that a submesh has in common with `Torus`.
-SHARED = ("triangle_edges", "edges", "constituent", *ROWS[3], *ROWS[4])
 
 
 @dataclass(frozen=True)
@@ -229,7 +227,14 @@ def _whole(torus: Torus, pinned: Int) -> Submesh:
         index=0,
         body=0,
         phase="",
-        **{name: getattr(torus, name) for name in SHARED},
+        constituent=torus.constituent,
+        triangle_edges=torus.triangle_edges,
+        edges=torus.edges,
+        at_void=torus.at_void,
+        debonded=torus.debonded,
+        touching=torus.touching,
+        class_keys=torus.class_keys,
+        edge_keys=torus.edge_keys,
         points=mesh.points,
         triangles=mesh.triangles.astype(np.int64),
         circles=torus.edge_circles,

@@ -153,6 +153,15 @@ class NodedCell:
         numbers, first, constituent = np.unique(precedence, return_index=True, return_inverse=True)
         of_circle = np.full(len(phase), -1)
         of_circle[solid] = constituent
-        width, height = self.scale * arrangement.width, self.scale * arrangement.height
-        cell = width, height, self.scale, arrangement.origin, arrangement.phases, lines.ellipses.scaled(self.scale)
-        return Regions(*cell, of_circle, phase[solid][first], numbers, nodes=len(lines.points))
+        return Regions(
+            width=self.scale * arrangement.width,
+            height=self.scale * arrangement.height,
+            scale=self.scale,
+            origin=arrangement.origin,
+            phases=arrangement.phases,
+            ellipses=lines.ellipses.scaled(self.scale),
+            constituent=of_circle,
+            phase=phase[solid][first],
+            precedence=numbers,
+            nodes=len(lines.points),
+        )

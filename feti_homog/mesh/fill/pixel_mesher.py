@@ -37,10 +37,16 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
         node_class, first = places % [columns, rows] @ [1, n], np.empty(n * rows, np.int32)
         first[node_class[::-1]] = representative[::-1]
         representative = first[node_class]
-    width, height, points = cell.pixel * columns, cell.pixel * rows, cell.pixel * places
-    names = tuple(name for name in phases if name != phase_names.VOID)
     mesh = CoarseMesh(
-        width, height, points, elements.astype(np.int32), number, names, number, representative, boundary=cell.boundary
+        width=cell.pixel * columns,
+        height=cell.pixel * rows,
+        points=cell.pixel * places,
+        triangles=elements.astype(np.int32),
+        phase=number,
+        phases=tuple(name for name in phases if name != phase_names.VOID),
+        precedence=number,
+        representative=representative,
+        boundary=cell.boundary,
     )
     if faults := [] if len(solid) == phase.size else _void_faults(mesh, is_solid):
         raise MeshError(*(f"{cell.file.name}: {fault}" for fault in faults))

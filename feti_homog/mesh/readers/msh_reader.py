@@ -98,9 +98,19 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
     names, (width, height) = [group[0] for group in raw.groups], size.tolist()
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
     phase = np.array([phases.index(name) for name in names], np.int32)[raw.group]
-    lines, corner = np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32), (float(origin[0]), float(origin[1]))
-    mesh = CoarseMesh(width, height, plane, raw.triangles, phase, phases, phase, representatives(plane, *shift))
-    mesh = replace(mesh, debonded_edges=lines, origin=corner, boundary=boundary)
+    mesh = CoarseMesh(
+        width=width,
+        height=height,
+        points=plane,
+        triangles=raw.triangles,
+        phase=phase,
+        phases=phases,
+        precedence=phase,
+        representative=representatives(plane, *shift),
+        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
+        origin=(float(origin[0]), float(origin[1])),
+        boundary=boundary,
+    )
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     torus = Torus.of(mesh)
     _refuse(path, mesh_checks.islands(raw, torus), mesh_checks.void_faults(raw, torus, has_voids))
