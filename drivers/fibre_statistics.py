@@ -168,6 +168,8 @@ def pattern(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     fibres = listed_fibres.read(source)
     width, height = fibres.size.tolist()
     own = [name != VOID for name in fibres.phases]
+    if lost := [str(k) for k, radius in enumerate(fibres.radii.tolist(), 1) if radius != radius]:
+        raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {', '.join(lost[:10])}")
     found = FibrePattern(width, height, fibres.ellipses.centres[own], fibres.radii[own], periodic=True)
     if found.count < 2:
         raise CaseError(f"{source}: expected at least two fibres, got {found.count}")

@@ -26,7 +26,7 @@ def table(source: Path) -> str:
     Raises:
         CaseError, MeshError: the source is faulty, or does not list its voids.
     """
-    fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
+    fibres = read(source)
     if fibres.lacks_voids:
         raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
     ellipses = fibres.ellipses
@@ -89,6 +89,11 @@ class ListedFibres:
     def radii(self) -> Float:
         """The radii (N,) of circles, and of equal-area discs for ellipses."""
         return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
+
+
+def read(source: Path) -> ListedFibres:
+    """Read the fibres of a case file or result folder.  On one rank.  Raises CaseError or MeshError if it is faulty."""
+    return _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
 
 
 def _of_result(directory: Path) -> ListedFibres:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pattern_statistics import hard_core, measure, poisson, smallest_gap
 from support.base_case import BASE, RANDOM
 from support.fibre_patterns import hexagonal_lattice, poisson_points, square_lattice
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis.runner import run
 from feti_homog.case import cases
@@ -92,8 +93,12 @@ def test_faults_of_tables(tmp_path, text):
 
 def test_other_faults(tmp_path):
     case = write(tmp_path / "case.toml", BASE.replace("hexagonal", "square"))
+    grid().write(tmp_path / "cell.msh")
+    materials = BASE[BASE.index("[material") :]
+    other = write(tmp_path / "other.toml", f'[cell]\ngeometry = "mesh"\nfile = "cell.msh"\n{materials}')
     for path, size, words in [
         (case, None, "expected at least two fibres, got 1"),
+        (other, None, "fibres that are neither round nor ellipses have no radius: 1$"),
         (case, (1.0, 1.0), "--size: only for a table"),
         (tmp_path, None, "cannot read"),
         (tmp_path / "nowhere.csv", None, f"{tmp_path}/nowhere.csv: cannot be read"),
