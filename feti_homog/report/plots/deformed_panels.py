@@ -202,6 +202,7 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
         cell.bar(grid[len(numbers) - 1], shapes[-1])
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.03)
     bar.locator = MaxNLocator(6)
+    bar.set_label(cell.caption if look.title is not None else "")
     bar.ax.set_title("before" if OWN_COLOURS in cell.marks.values() else "")
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
