@@ -76,7 +76,7 @@ REGISTRY = (
             f"softening.{name.capitalize()}Law",
             (*COHESIVE, *OF_SOFTENING, *(BRANCH if name == "table" else ())),
             description,
-            ((r"N", "normal_strength", True), (r"S", "tangential_strength", True)),
+            tuple(zip(("N", "S", r"G_\mathrm{n}", r"G_\mathrm{t}"), COHESIVE, (True, True, False, False), strict=True)),
             needs=needs,
             softens=True,
         )

@@ -98,7 +98,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
         parser.add_argument("directory", type=folder, metavar="DIR")
     plot, _, fields, export, verify = of_result
     plot.add_argument("--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: vector graphics")
-    words = 'draw this state alone, by its number in result.h5, from 0, or its label, such as "event 12"'
+    words = 'draw this state alone: number in result.h5, from 0, label, such as "event 12", or mark, such as "peak"'
     plot.add_argument("--state", metavar="STATE", help=words)
     stresses = ("S11", "S22", "S12", "S33", "S23", "S13", "von_mises")
     plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress to draw: S11, ..., or von_mises")

@@ -245,10 +245,10 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
-        part = cut(case, lattice, comm, policy)
-        summary = part.summary
+        summary = (part := cut(case, lattice, comm, policy)).summary
         shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
-        line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
+        pieces = f"{summary.subdomains} subdomain{'s' * (summary.subdomains > 1)}"
+        line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {pieces}")
 
     def assembled() -> list[Subdomain]:
         problem, subdomains = phase_laws.problems(case)[0], list[Subdomain]()

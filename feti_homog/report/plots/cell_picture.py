@@ -76,17 +76,15 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 
     A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
-    drawn = cell.drawn
-    ranks = np.unique(drawn.rank)
+    drawn, ranks = cell.drawn, np.unique(cell.drawn.rank)
     kind, coloured = ("rank", drawn.rank) if len(ranks) > 1 else ("part", drawn.subdomain)
-    numbers = np.unique(coloured)
-    is_numbered = len(numbers) > IN_LEGEND
+    is_numbered = len(numbers := np.unique(coloured)) > IN_LEGEND
     colours = 1.0 - (0.2 if is_numbered else 0.6) * (1.0 - _cyclic_colours(coloured.max() + 1))
     picture, axes = _outlined(cell, colours[coloured], look)
     cuts = decimation.outline_edges(drawn, drawn.subdomain)
     plot_helpers.draw_segments(axes, drawn.points[cuts], CUT, 0.8)  # hidden below the outlines
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.9)
-    text = f"bodies: {drawn.body.max() + 1}, parts: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
+    text = f"bodies: {drawn.body.max() + 1}, parts within bodies: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
     axes.set_title(_title(cell.file.attrs, text))
     entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers if not is_numbered]
     entries += [Line2D([], [], color=CUT, label="cut within a body")] * (len(cuts) > len(cell.borders))
@@ -237,7 +235,8 @@ def deformed(
             corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
             outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1) + drawn.points.min(axis=0)
         plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
-        line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+        label = "undeformed" + f"; displacement × {scale:g}" * (look.title is not None)
+        line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label=label)
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
     marks = cell.interface.mark(axes, moved, state)
     drawn_cell.label_cell_axes(axes, attributes)

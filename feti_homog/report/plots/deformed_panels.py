@@ -203,6 +203,7 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
         figure.colorbar(shapes[-1], below, extend=shapes[-1].cmap.colorbar_extend, orientation="horizontal")
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.03)
     bar.locator = MaxNLocator(6)
+    bar.set_label(cell.caption if look.title is not None else "")
     bar.ax.set_title("before" if OWN_COLOURS in cell.marks.values() else "")
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()

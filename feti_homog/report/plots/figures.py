@@ -12,7 +12,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials import voigt
 from feti_homog.report.plots import cell_picture, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
-from feti_homog.results import atomic, checkpoints, field_file, output_folder, result_json
+from feti_homog.results import atomic, checkpoints, field_file, landmarks, output_folder, result_json
 from feti_homog.typing import Document
 
 
@@ -33,8 +33,8 @@ def plot(
     - interface.png, of a path or a debonded interface: tractions, jumps and damage around fibres.
 
     [output] of the case in result.json sets the stress component (default: from the unit strain) and the deformation
-    scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by number
-    or label, only state_K.png is drawn.  Call on one rank.
+    scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by
+    number, label or mark, only state_K.png is drawn.  Call on one rank.
 
     Raises:
         CaseError: the result has no such state or component.
@@ -52,8 +52,7 @@ def plot(
                 with h5py.File(directory / field_file.NAME, "r") as file:
                     paths = of_fields(directory, file, document, look, state)
             except OSError as error:
-                reason = error.strerror or error
-                raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {reason}") from error
+                raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
         if state is None and document.keys() & {"angle", "path", "envelope", "sensitivities"}:
             from feti_homog.report.plots import response_curves  # most results have no curves
 
@@ -80,11 +79,12 @@ def of_fields(
         return plot_helpers.save(figure, directory / f"{name}.png", look)
 
     if chosen is not None:
-        labels = {number: state.attrs["label"] for number, state in states.items()}
-        number = next((number for number, label in labels.items() if str(chosen) in (number, label)), None)
+        marks = {n: mark.split(" and ") for n, mark in landmarks.marks(document).items()} if report.is_followed else {}
+        labels = {k: [state.attrs["label"], *marks.get(int(state.attrs["point"]), ())] for k, state in states.items()}
+        number = next((k for k, label in labels.items() if str(chosen) in (k, *label)), None)
         if number is None:
-            names = ", ".join(f"{number} ({label})" for number, label in labels.items())
-            raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {names}")
+            lines = ", ".join(f"{k} ({', '.join(label)})" for k, label in labels.items())
+            raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {lines}")
         return [save(cell_picture.deformed(cell, states[number], document, look), f"state_{number}")]
     pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
     figures = ((name, draw(cell, look)) for name, draw in pictures.items())

@@ -50,7 +50,7 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
     upper.set_title("\n".join(filter(None, (title, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
-        axes.plot(strain, [point["temperature"] for point in points], color="0.3", linewidth=1.2, **style)
+        axes.plot([0.0, *strain], [0.0, *(point["temperature"] for point in points)], color="0.3", lw=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
     _count_curves(lower, document, strain, style)
     lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)

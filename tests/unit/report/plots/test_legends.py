@@ -46,7 +46,7 @@ def write(directory: Path, whole: Sample, document: dict[str, Any] | None) -> No
         (directory / "result.json").write_text(json.dumps(document))
 
 
-def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
+def drawn(directory: Path, monkeypatch: Any, look: plot_helpers.Look = plot_helpers.PLAIN) -> dict[str, Figure]:
     """Return the figures of a result by the names of their files."""
     found: dict[str, Figure] = {}
 
@@ -56,7 +56,7 @@ def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
         return path
 
     monkeypatch.setattr(plot_helpers, "save", keep)
-    figures.plot(directory)
+    figures.plot(directory, look)
     return found
 
 
@@ -127,6 +127,9 @@ def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkey
     assert scale * opening > 0.02
     title: Any = drawn(tmp_path, monkeypatch)["path_states.png"].get_suptitle()
     assert title.endswith(f"displacement × {scale:g}")
+    # Another title leaves the scale in the picture.
+    panels = drawn(tmp_path, monkeypatch, plot_helpers.Look(title=""))["path_states.png"]
+    assert panels.axes[-1].get_ylabel().endswith(f"displacement × {scale:g}")
 
 
 def in_six(points: list[tuple[float, float, float]], path: dict[str, Any], **more: Any) -> dict[str, Any]:
@@ -156,7 +159,9 @@ def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
     figure = path_picture(in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0))
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
-    low, high = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)].get_ylim()
+    heated = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)]
+    np.testing.assert_allclose(heated.lines[0].get_xydata(), [[0, 0], [0, -9], [1, -9], [2, -9]])  # from no load on
+    low, high = heated.get_ylim()
     assert low < -9.0 < 0.0 < high
 
 
@@ -264,4 +269,7 @@ def test_what_breaks_the_bonds_is_in_the_title():
     assert plot_helpers.bond_limits({"interface": {"criterion": "energy", "toughness": 3e-5}}) == [
         "law energy, $G_\\mathrm{Ic}=3e-05$"
     ]
+    law = {"criterion": "table", "normal_strength": 6.0, "tangential_strength": 8.0, "normal_toughness": 0.02}
+    words = ["table law, $N=6$, $S=8$, $G_\\mathrm{n}=0.02$, $G_\\mathrm{t}=0.04$"]
+    assert plot_helpers.bond_limits({"interface": law | {"tangential_toughness": 0.04}}) == words
     assert plot_helpers.bond_limits({}) == ["no debonding by load"]

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from support.sample_output import Sample, sample
 
+from feti_homog.errors import CaseError
 from feti_homog.report.plots import deformed_panels, figures, plot_helpers
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
@@ -105,3 +106,17 @@ def test_panels_have_the_colours_of_all_states(tmp_path: Path, monkeypatch: Any)
             ranges.append((cell.colours[0].vmin, cell.colours[0].vmax))
     assert ranges[0][0] == -ranges[0][1] and 2.5 < ranges[0][1] <= 3.5
     assert ranges[1][0] == -ranges[1][1] and 2.0 < ranges[1][1] <= 3.0
+
+
+def test_a_state_of_a_path_is_drawn_by_its_mark(tmp_path: Path, monkeypatch: Any) -> None:
+    marks = {0: "first break and largest stress", 2: "end"}
+    monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda document: marks)
+    write(tmp_path, sample(4), document := path_of([0.1, 0.2, 1.0]))
+    with h5py.File(tmp_path / "result.h5") as file:
+        points = {number: int(state.attrs["point"]) for number, state in file["state"].items()}
+        assert {*marks} <= {*points.values()}
+        for word, point in (("first break", 0), ("largest stress", 0), ("end", 2)):
+            (path,) = figures.of_fields(tmp_path, file, document, plot_helpers.PLAIN, word)
+            assert points[path.stem.removeprefix("state_")] == point
+        with pytest.raises(CaseError, match=r"--state peak: .*, first break, largest stress\), .*, end\)"):
+            figures.of_fields(tmp_path, file, document, plot_helpers.PLAIN, "peak")
