@@ -254,16 +254,9 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
     class_keys, node_class = np.unique(classes, return_inverse=True)
     keys, torus_edge = np.unique(np.sort(classes[plane], axis=1) @ np.array([all_nodes, 1]), return_inverse=True)
     void_arcs = mesh.arc_edges[regions.constituent[mesh.arc_circle] < 0]
+    constituent = np.searchsorted(regions.precedence, mesh.precedence)
+    at_void = np.isin(keys, np.sort(classes[void_arcs], axis=1) @ [all_nodes, 1])
     torus = Torus(
-        mesh=mesh,
-        node_class=node_class,
-        edges=plane,
-        triangle_edges=triangle_edges,
-        torus_edge=torus_edge,
-        constituent=np.searchsorted(regions.precedence, mesh.precedence),
-        class_keys=class_keys,
-        edge_keys=keys,
-        at_void=np.isin(keys, np.sort(classes[void_arcs], axis=1) @ [all_nodes, 1]),
-        is_whole=False,
+        mesh, node_class, plane, triangle_edges, torus_edge, constituent, class_keys, keys, at_void, is_whole=False
     )
     return torus, tile
