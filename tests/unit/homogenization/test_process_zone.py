@@ -72,8 +72,8 @@ def test_long_elements_are_warned_of():
     (line,) = warnings(case_of())
     assert line == (
         '[interface] law = "energy": elements on the interface are up to 0.981 long; the process zone '
-        "is E' G_Ic / sigma_c^2 = 0.773 long for sigma_c = sqrt(2 k_n G_Ic) = 90, elements should be at most half of "
-        "that: set interface_size = 0.018 (or mesh_size, of all elements), or refine = 2"
+        "is E' G_Ic / sigma_c^2 = 0.773 long for sigma_c = sqrt(2 k_n G_Ic) = 90, elements should be at most half "
+        "as long: set interface_size = 0.018 (or mesh_size, of all elements), or refine = 2"
     )
     (refined,) = warnings(case_of(refine=1))
     assert "up to 0.491 long after refine = 1" in refined and "interface_size = 0.036" in refined
