@@ -68,7 +68,7 @@ class InfluenceSolutions:
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
         """Compute the multipliers H d E (owned rows, k) for loads E (v, k).  Collective.
 
-        If `solutions` has just made a prediction, return column j of the predicted multipliers times `weights`[j].
+        If `solutions` has just made a prediction, return column j of the predicted multipliers times `weights[j]`.
         """
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
