@@ -1,6 +1,6 @@
-"""Compare the times of two sweeps and of CHOLMOD solves on the same meshes.
+"""Compare run times: a sweep on one rank, a sweep with a case on each rank, and CHOLMOD on the same meshes.
 
-One sweep runs on one rank, one has a case on each rank. All three are whole commands, start-up included, run in turns.
+All three are whole commands, start-up included, run in turns.
 The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor
 time, which other programs change least, is summed over all ranks.
 """

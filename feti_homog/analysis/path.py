@@ -38,7 +38,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds, top = list[tuple[float, float]](), ""
-    is_said = not any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # the load prescribes strains
+    may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line has reported it
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' * bool(before)}"
@@ -67,11 +67,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             is_known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), counts, is_known)
             top = place if point.load_factor == work.largest_load else top
-            if not is_said and (is_said := point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load):
-                context.progress.say(
-                    f"  the load falls, after its largest value so far {top}; this path ends at 1, perhaps far away: "
-                    "a prescribed strain, such as [path] to = {E22 = 0.01}, ends it earlier"
-                )
+            if may_fall and point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load:
+                way = "the path ends at load factor 1, perhaps much later; with a prescribed strain it ends earlier"
+                context.progress.say(f"  the load falls from its largest value so far, {top}; {way}")
+                may_fall = False
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break

@@ -115,9 +115,11 @@ def error_shares(cell: TornCell, response: Response) -> Float:
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
     """Name the places at which stresses of plane states would grow without limit on finer meshes.  Collective."""
     places = {"corners of fibres"} if cell.summary.has_corners else set[str]()
-    if any(bond.normal_stiffness is None for bond in cell.case.interfaces):
-        length, masks = FibreInterfaces(cell).length, [s.state.status == Contact.BONDED for s in states if s]
-        places |= {"tips of debonding" for bonded in masks if np.minimum(length(bonded), length(~bonded)).any()}
+    is_rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
+    masks = [s.state.status == Contact.BONDED for s in states if is_rigid and s is not None and s.debonded]
+    length = FibreInterfaces(cell).length if masks else None
+    if length and any(np.minimum(length(bonded), length(~bonded)).any() for bonded in masks):
+        places.add("tips of debonding")
     return places
 
 

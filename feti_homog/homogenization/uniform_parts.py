@@ -132,7 +132,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factored interior of subdomains of one phase on a coarser mesh.
+    """The factor of the interior on a coarser mesh, for a group of subdomains with one phase.
 
     Attributes:
         members: subdomains.
@@ -194,7 +194,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield index groups of consecutive subdomains of one phase, up to ELEMENTS_AT_ONCE elements or one subdomain."""
+    """Group consecutive subdomains by phase: at most ELEMENTS_AT_ONCE elements or one subdomain.  Yields indices."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

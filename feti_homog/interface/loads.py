@@ -91,9 +91,9 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Interpolate between this load and the load `end`, which prescribes stresses in the same components.
+        """Return (1 - share) load + share end; components that cancel are zero.
 
-        The result is (1 - share) load + share end; components that cancel are zero.
+        Both loads prescribe stresses in the same components.
         """
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)

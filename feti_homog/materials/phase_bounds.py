@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The fibres of one phase: volume fraction, constants, and springs around fibres of equal radius, None without."""
+    """The round fibres of one phase, with one radius; `springs` is None if the interface is not elastic."""
 
     fraction: float
     constants: TransverseIsotropy

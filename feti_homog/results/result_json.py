@@ -118,10 +118,10 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 
 
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
-    """Write records of one class as rows, and return the path.  Call on one rank.
+    """Write a CSV table with a row for each record, and return the path.  Call on one rank.
 
-    Columns are numbers, and array components; empty columns, other arrays and nested records are left out.  Raises
-    FetiHomogError if the table cannot be written.
+    The records have one class.  Columns are numbers, and array components, without empty columns, other arrays and
+    nested records.  Raises FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []

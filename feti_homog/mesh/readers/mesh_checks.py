@@ -166,12 +166,9 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """List corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
-    missing, advice = (
-        [at(corner + origin) for corner in bare],
-        "if a hole is there, shift the fibres until the corners lie",
-    )
-    away = _nearest(plane, bare, size[0])
-    return [f"no node at the corner {', '.join(missing)} of the cell{away}; {advice} in material"] if missing else []
+    missing = [at(corner + origin) for corner in bare]
+    advice = f"{_nearest(plane, bare, size[0])}; if a hole is there, shift the fibres until the corners lie in material"
+    return [f"no node at the corner {', '.join(missing)} of the cell{advice}"] if missing else []
 
 
 def _nearest(plane: Float, places: Float, width: float, close: float = 0.02) -> str:

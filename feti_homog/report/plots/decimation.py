@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Number the node positions in each body (p,).  Torn nodes at the same position have the same number."""
+        """Number the distinct positions in each body, for all nodes (p,).  Torn nodes share a number."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]

@@ -245,7 +245,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return a stress at the drawn nodes (p,), averaged over adjacent triangles of the same body."""
+    """Return the stress at each drawn node (p,): the mean over the adjacent triangles of its body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
     if component == VON_MISES:  # by element means, as in `viewed_states`

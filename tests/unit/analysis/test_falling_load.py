@@ -1,4 +1,4 @@
-"""A path by stresses says once that it has passed its largest load, and which strain to prescribe instead."""
+"""Paths by stresses print one line when the load falls from its largest value, with a remedy."""
 
 import pytest
 from mpi4py import MPI
@@ -9,7 +9,7 @@ from feti_homog.system.runtime.standard_streams import Progress
 
 
 @pytest.mark.parametrize("to", [{"S22": 100.0}, {"S11": -1.0, "S22": 90.0}, {"E22": 0.01}])
-def test_a_load_that_falls_from_its_largest_value_is_said_once(to, tmp_path, monkeypatch):
+def test_a_load_that_falls_from_its_largest_value_has_one_line(to, tmp_path, monkeypatch):
     cohesive = {"normal_stiffness": 1e5, "tangential_stiffness": 1e5, "normal_toughness": 0.02}
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15},
@@ -23,12 +23,13 @@ def test_a_load_that_falls_from_its_largest_value_is_said_once(to, tmp_path, mon
     lines = []
     monkeypatch.setattr(Progress, "say", lambda self, line: lines.append(line))
     result = runner.run(cases.parse(document, tmp_path), tmp_path / "out", Progress(MPI.COMM_SELF, True))
-    said = [line for line in lines if "largest value so far" in line]
+    printed = [line for line in lines if "largest value so far" in line]
     if "E22" in to:  # the strain prescribes where the path ends
-        assert said == []
+        assert printed == []
         return
     load = [point.load_factor for point in result.path]
     first = next(k for k in range(len(load)) if load[k] < 0.95 * max(load[: k + 1]))
     top = max(result.path[:first], key=lambda point: point.load_factor)
-    (line,) = said
-    assert f"at {top.load_factor:.6f}, E22 {top.strain[1]:.4g}, S22 {top.stress[1]:.4g}; this path ends at 1" in line
+    (line,) = printed
+    place = f"at {top.load_factor:.6f}, E22 {top.strain[1]:.4g}, S22 {top.stress[1]:.4g}"
+    assert f"{place}; the path ends at load factor 1" in line and "prescribed strain" in line

@@ -175,7 +175,7 @@ def test_only_moves_beyond_rounding_are_warnings(moved: float, warns: int, unit:
 @pytest.mark.parametrize(("name", "more"), [("hexagonal", {}), ("two_fibres", {}), ("hexagonal", {"refine": 1}),
                                             ("two_fibres", {"order": 2})])  # fmt: skip
 def test_straight_edges_of_a_users_mesh_have_the_remark_of_generated_cells(name, more):
-    """The areas of the circles and ellipses that the result names, less those of the meshed fibres."""
+    """The lost area is the area of the outlines in the result minus the area of the meshed fibres."""
     phase = {"young": 3.0, "poisson": 0.3}
     case = {
         "cell": {"geometry": "mesh", "file": f"{name}.msh"} | more,

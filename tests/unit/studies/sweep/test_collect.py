@@ -274,7 +274,7 @@ def test_angles_in_space_have_all_entries():
 
 
 def test_what_varies_along_is_no_other_series():
-    """Keys of one value have no series, and points of a series are in rising order."""
+    """A key with one value makes no series; the abscissas of a series rise."""
     counts = [8, 4, 4, 8]
     sizes = {"cell.mesh_size": [0.2, 0.3, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2], "cell.order": [1] * 4}
     documents = [document(0.4, fibres, 0.0) for fibres in counts]
