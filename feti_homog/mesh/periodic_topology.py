@@ -232,7 +232,10 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
-    """Find the two triangles (k,) and (k,) beside each shared edge, in ascending order of edges."""
+    """Find the two triangles (k,) and (k,) beside each shared edge, in ascending order of edges.
+
+    Memory grows with the largest edge number.
+    """
     edges, sides = triangle_edges.ravel(), np.arange(triangle_edges.size)
     first, last = np.zeros((2, edges.max(initial=-1) + 1), np.int64)
     first[edges[::-1]], last[edges] = sides[::-1], sides

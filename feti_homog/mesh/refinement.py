@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import HALVES, edge_keys, edges
-from feti_homog.mesh.periodic_topology import edge_pairs
+from feti_homog.mesh.coarse_mesh import HALVES, edge_keys, edges, twins
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
@@ -231,7 +230,8 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     Triangles have `centres` (t, 2) and `nodes` (t, q), corners first; `inside` (q,) orders the nodes of one triangle.
     """
     size = int(nodes.max()) + 1
-    leaf = _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size).reshape(-1, 3)))
+    one, other = twins(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size))
+    leaf = _halved(centres, (one // 3, other // 3))
     by_leaf = np.argsort(leaf)
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)

@@ -1,5 +1,6 @@
 """The order of elimination against the fill that it is for."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -54,3 +55,13 @@ def test_the_last_nodes_are_those_of_the_cut_that_crosses_fewest_sides():
     x, y = mesh.points.T
     order = elimination_order(replace(mesh, points=np.stack([100 * x, y], axis=1)))
     assert set(y[order[-5:]].tolist()) == {8.0}
+
+
+def test_memory_grows_with_the_mesh_alone():
+    """Edges have a number below the square of the node count, which must not become the size of an array."""
+    mesh = grid(64, 64, 1, True)
+    tracemalloc.start()
+    elimination_order(mesh)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1000 * mesh.n_classes
