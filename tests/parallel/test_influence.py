@@ -168,20 +168,24 @@ def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
 
 
 @pytest.mark.few_ranks  # four would cut the matrix, whose pieces bear more forces: rounding is 3e-13 then
-def test_answers_stay_exact_while_few_faces_hold_a_free_fibre(comm):
-    """Faces beside each other hold its place loosely, one after the other; then faces around it hold it well."""
+def test_rounding_of_answers_is_estimated_while_few_faces_hold_a_free_fibre(comm):
+    """Faces beside each other hold it loosely, faces around it well; an answer that rounds too much is renewed."""
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, order=2, petsc=INFLUENCE)
     solver, influence, dense = cell.solver, cell.solver.exact_inverse, DenseDual(cell)
     angle = np.degrees(np.arctan2(*solver.jump_operator.nodes.normal.T[::-1]))
-    d = gathered(cell, solver.d)
-    for middle in range(-120, 120, 20):
+    d, estimates = gathered(cell, solver.d), []
+    for turn, middle in enumerate(range(-120, 120, 20)):
         for at in ([], [middle - 12, middle, middle + 12], [middle, middle - 120, middle + 120]):
             away = np.abs((angle[:, None] - np.array(at) + 180) % 360 - 180)
             active = activate(cell, np.where((away < 6).any(axis=1), CLOSED, OPEN).astype(np.int8))
+            influence._followed.rounding += float(turn == 9)
             answer = influence.answer(solver.d, np.eye(3), solver.natural.unconstrained_modes.shape[1])
             if active.any() and answer is not None:
                 jump, G = (d - dense.F @ gathered(cell, answer[0]))[active], dense.G[active]
-                assert np.abs(jump - G @ np.linalg.lstsq(G, jump, 1e-10)[0]).max() < 1e-14 * np.abs(d).max()
+                estimates.append(influence._followed.rounding)
+                error = np.abs(jump - G @ np.linalg.lstsq(G, jump, 1e-10)[0]).max()
+                assert error < (3.0 * estimates[-1] + 1e-14) * np.abs(d).max()
+    assert min(estimates[1:]) == 0.0 < max(estimates) < 1e-12
 
 
 @pytest.mark.few_ranks  # four would cut the matrix, whose pieces bear more forces
@@ -279,8 +283,7 @@ def test_more_ranks_than_subdomains(comm):
     cell = torn_cells.tear(comm, geometry="square", decomposition={"subdomains": 2}, petsc=INFLUENCE)
     for status in states(cell):
         activate(cell, status)
-        for solution in solve_many(cell):
-            assert solution.reason > 0 and solution.iterations == 0 and solution.residual < 1e-8
+        assert all(s.reason > 0 and s.iterations == 0 and s.residual < 1e-8 for s in solve_many(cell))
 
 
 def test_influence_columns_that_cannot_be_are_refused(comm):

@@ -58,6 +58,7 @@ class ExactInverse(Preconditioner):
         self.comm, self._operators, self._max_changes = comm, operators, max_changes
         self._first, end = jump_operator.owned
         self._rows = end - self._first
+        self._no_answer = np.zeros((self._rows, 0))
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
         # K <= n diag(K) for the n displacements of an element; tests measure the bound where bodies meet.
         displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
@@ -102,8 +103,7 @@ class ExactInverse(Preconditioner):
         """Factor the cell in its present state, and follow columns from the new response.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
-        nothing = np.zeros((self._rows, 0))
-        self._followed = FollowedResponse(self.comm, self._first, self.stiffness, nothing, self.most_followed)
+        self._followed = FollowedResponse(self.comm, self._first, self.stiffness, self._no_answer, self.most_followed)
         self._factor(self._active)
         self._follow(active, more, 0.0)
         self._is_fresh = True
@@ -115,8 +115,7 @@ class ExactInverse(Preconditioner):
             process.trim_memory()
         self.reference = ReferenceCell(self._operators, self._one_sided, active)
         self.factorizations += 1
-        nothing = np.zeros((self._rows, 0))
-        self._unchanged = FollowedResponse(self.comm, self._first, self.stiffness, nothing, self.most_followed)
+        self._unchanged = FollowedResponse(self.comm, self._first, self.stiffness, self._no_answer, self.most_followed)
         self._answer: Float | None = None
         self._rounding: float | None = None
         # The new reference cell differs from the present cell by ties, which do not count towards the option.
@@ -221,8 +220,8 @@ class ExactInverse(Preconditioner):
             if not self._is_fresh:
                 self._restart()
             return None
-        is_exact = self._followed.answer.shape[1] and not self._followed.had_pins
-        U = (self._followed.answer if is_exact else self.renew_answer(d)) @ E
+        has_digits = self._followed.rounding <= thresholds.MOST_FOLLOWED_ERROR
+        U = (self._followed.answer if self._followed.answer.shape[1] and has_digits else self.renew_answer(d)) @ E
         lam = distributed_arrays.scale_rows(self._active, U)
         return lam, U - lam
 
@@ -237,8 +236,9 @@ class ExactInverse(Preconditioner):
             self._answer = self._of_reference(d)
         # U is 0 on pins, which bear no force and do not move.
         mask = 1.0 - self._rows_with_pins + self._active
-        self._followed.answer = distributed_arrays.scale_rows(mask, changes.refined(self._answer))
-        return self._followed.answer
+        U = distributed_arrays.scale_rows(mask, changes.refined(self._answer))
+        self._followed.answer, self._followed.rounding = U, 0.0
+        return U
 
     def inverse_blocks(self, pairs: Int) -> Float:
         """Compute the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.

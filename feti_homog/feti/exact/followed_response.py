@@ -36,7 +36,7 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows of pins, which hold bodies that no active row holds.
-        had_pins: whether a body has been free; U then loses digits at every change on the interface of that body.
+        rounding: estimated rounding error of U, relative to its largest entries; 0 when U is new.
     """
 
     def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
@@ -46,9 +46,8 @@ class FollowedResponse:
         drops unused columns.
         """
         self._comm, self._first, self._stiffness = comm, first, stiffness
-        self.answer, self.pins, self.had_pins = answer, np.zeros(0, np.int64), False
-        self._slot = np.full(len(stiffness), -1)
-        self._rows: Int = np.zeros(0, np.int64)
+        self.answer, self.pins, self.rounding = answer, np.zeros(0, np.int64), 0.0
+        self._slot, self._rows = np.full(len(stiffness), -1), np.zeros(0, np.int64)
         # Number of the change at which every column was last used, and number of the present change.
         self._used, self._now = np.zeros(capacity, np.int64), 0
         # The operating system provides this memory only when columns are written.
@@ -153,10 +152,8 @@ class FollowedResponse:
         # Rows become active first, so that fewer bodies are free in between; half of the room is for pins.
         moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(signs[moves], kind="stable")]
-        for part in np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1) if len(moves) else []:
-            if not self._turn(rows[part], signs[part], gains[part], pivot):
-                return False
-        return True
+        parts = np.array_split(moves, 2 * len(moves) // thresholds.WAITING_COLUMNS + 1)
+        return all(self._turn(rows[part], signs[part], gains[part], pivot) for part in parts if len(part))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
         """Update U and columns, like `follow`, for springs (k,) that gain compliance `more` (k,).  Collective."""
@@ -189,7 +186,8 @@ class FollowedResponse:
         if inverse is None:
             return False
         self.answer = self.answer.copy()
-        which, B = inverse
+        which, B, growth = inverse
+        self.rounding += np.finfo(float).eps * growth
         if len(which):
             self._make_room(len(which))
             s, difference, places = sign[which], np.take(columns, which, axis=1), rows[which] - self._first
@@ -207,7 +205,7 @@ class FollowedResponse:
             self._buffer[:, at], self._factors[at] = new_columns, 0.0
         if len(loaded) or len(which) < k or len(self.pins):
             loose = np.setdiff1d(np.arange(k), which)
-            self.pins, self.had_pins = np.union1d(np.setdiff1d(self.pins, loaded), rows[loose]), True
+            self.pins = np.union1d(np.setdiff1d(self.pins, loaded), rows[loose])
             places = self.pins - self._first
             self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
             # Springs of pins have C_0, like springs of inactive rows.
@@ -248,14 +246,15 @@ class FollowedResponse:
         self._count = 0
 
 
-def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
-    """Invert `block` (k, k) on the rows that can change; return their positions and the inverse.
+def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float, float] | None:
+    """Invert `block` (k, k) on the rows that can change; return their positions, the inverse and `growth`.
 
-    Rows can always become active (sign -1); rows can become inactive (1) if no body becomes free.  The result is None
-    if a scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1); rows can become inactive (1) if no body becomes free.  Rounding grows with
+    the largest compliance of a row * `stiffness` (k,): `growth`.  None if a scaled pivot is at most `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
-    root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
+    units = np.where(sign > 0.0, stiffness, 1.0 / stiffness)
+    root = np.sqrt(np.maximum(units, np.abs(block.diagonal())))
     outer = np.outer(root, root)
     scaled, which = block / outer, np.arange(len(block))
     if not _has_digits(scaled, thresholds.LEAST_FOLLOWED):
@@ -270,7 +269,9 @@ def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple
         which = np.concatenate([on, off[order[:rank] - 1]])
         if not _has_digits(scaled[which[:, None], which], pivot):
             return None
-    return which, np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
+    B = np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
+    compliances = np.abs([block.diagonal()[which] / units[which], B.diagonal() * units[which]])
+    return which, B, float(compliances.max(initial=1.0))
 
 
 def _has_digits(block: Float, pivot: float) -> bool:
