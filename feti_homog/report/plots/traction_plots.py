@@ -77,7 +77,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     ]
     plot_helpers.legend_below(picture, patches)
     before, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {labels.label(last)}"
+    title = f"{last['label']}: {labels.label(last)}" + ", one of the loads" * (reported(document).name == "stiffness")
     if len(names) > 1:
         title += f" (dashed: {before['label']})" if stacked else f" (dashed: {before['label']}: {labels.label(before)})"
     if len(harmed) > len(chosen):
