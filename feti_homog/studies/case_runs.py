@@ -60,7 +60,7 @@ def run_all(
     check_options(sweep)
     if sweep.cases[0].cell.has_own_mesh and "matrix" not in sweep.cases[0].materials:  # few meshes lack this phase
         with suppress(MeshError):  # a fault of this case alone
-            mpi_errors.on_root(comm, tile_tearing.begin_mesh, sweep.cases[0], partition_policy.BY_COST.tiles)
+            mpi_errors.on_root_only(comm, tile_tearing.begin_mesh, sweep.cases[0], partition_policy.BY_COST.tiles)
     with _sweep_lock(directory, comm, sweep, shared=False):
         group: Any = comm if size == comm.size else comm.Split(comm.rank // size)
         if retry:

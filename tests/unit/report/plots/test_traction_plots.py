@@ -93,11 +93,11 @@ def test_values_beyond_the_axes_are_marked_in_their_panel() -> None:
     upper, lower = panels = Figure().subplots(2, 1, sharey=True)
     wave = np.sin(np.linspace(0.0, 7.0, 300))
     upper.plot(np.append(wave, [40.0, -30.0]))
-    lower.plot(np.append(wave, -20.5))
+    lower.plot(np.append(wave, 20.5))
     _limit(panels)
     low, high = lower.get_ylim()
-    assert -20.5 < low < -1.0 and 1.0 < high < 40.0
-    assert [text.get_text() for axes in panels for text in axes.texts] == ["▲ 40\n▼ -30", "▼ -20.5"]
+    assert -30.0 < low < -1.0 and 1.0 < high < 20.5
+    assert [text.get_text() for axes in panels for text in axes.texts] == ["▲ 40\n▼ -30", "▲ 20.5"]
     smooth = Figure().subplots()
     smooth.plot(wave)
     _limit([smooth])
