@@ -103,14 +103,17 @@ def _read_material(
     for name, (form, *further) in FORMS_OF.items():
         if name in names and not further:
             given.setdefault(form, []).append(name)
-    forms = list(given) or ["conductor" if "conductivity" in names else "isotropic"]
+    conducts = "conductivity" in names or plane == voigt.CONDUCTION.name
+    forms = list(given) or ["conductor" if conducts else "isotropic"]
     if len(forms) > 1:
         groups = " and ".join(f"{', '.join(keys)} ({form})" for form, keys in given.items())
         way = laws.OF_DATA_SHEETS if "orthotropic" in forms else "a material is of one kind"
         reader.faults.append(f"[{section}] {groups}: exclude each other; {way}")
         return None
     material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
-    if material is not None:
+    if material is None and "orthotropic" in forms and ": missing" in reader.faults[-1]:
+        reader.faults[-1] += f"; {laws.OF_DATA_SHEETS}"
+    elif material is not None:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
         if material.strength is not None and plane != voigt.CONDUCTION.name:
             checks += [lambda m: material_forms.criterion(m.strength), partial(_known_stress, plane=plane)]
@@ -134,12 +137,25 @@ def missing_expansions(materials: Mapping[str, material_forms.Material], needed_
 
     Materials with other faults are skipped: `read_materials` reports them.
     """
-    faults = []
+    faults, pair = [], f"{', '.join(material_forms.EXPANSION_PAIR)}, or one expansion"
     for phase, material in materials.items():
+        name = pair if isinstance(material, material_forms.TransverselyIsotropic) else "expansion"
         with suppress(ValueError):
             if laws.expansion(material) is None:
-                faults.append(f"[material.{wording.toml_key(phase)}] expansion: missing; {needed_by} needs it")
+                faults.append(f"[material.{wording.toml_key(phase)}] {name}: missing; {needed_by} needs it")
     return faults
+
+
+def unlike_moduli(materials: Mapping[str, material_forms.Material]) -> list[str]:
+    """List fibres softer than the matrix, or stiffer by more than the ratio of GPa to MPa, one per line."""
+    names = "young", "stiffness", "E1", "E2", "E3", "E_axial", "E_transverse"
+    moduli = {k: max(float(np.max(vars(m).get(name) or 0.0)) for name in names) for k, m in materials.items()}
+    matrix = moduli.pop(phase_names.MATRIX, 0.0)
+    return [
+        f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are the units alike?"
+        for phase, value in moduli.items()
+        if phase != phase_names.COATING and value * matrix and not matrix <= value <= 1e3 * matrix
+    ]
 
 
 def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:

@@ -142,21 +142,18 @@ def _conditional_keys() -> Iterator[Rule]:
 
 def _cell() -> Iterator[Rule]:
     """Yield the requirements and exclusions between keys of [cell]."""
-    yield exclusive(CELL, "width", "fibre_radius")
+    for pair in (("width", "fibre_radius"), ("fibre_fraction", "mix"), ("match", "mix"), ("fibre_radius", "radii")):
+        yield exclusive(CELL, *pair)
     names, line = ("accuracy", *CHOSEN), "exclude each other; accuracy chooses the sizes"
     yield Rule(CELL, lambda cell: not has(cell, "accuracy") or {*CHOSEN}.isdisjoint(cell), line, names=names)
-    yield exclusive(CELL, "fibre_fraction", "mix")
-    yield exclusive(CELL, "match", "mix")
-    line = "belongs to mix, which is missing; use fibre_radius"
-    yield replace(needed(CELL, "mix", line, beside="radii"), names=("radii",))
-    yield exclusive(CELL, "fibre_radius", "radii")
+    for name, owner, instead in (("radii", "mix", "; use fibre_radius"), ("void_radius", "voids", "")):
+        line = f"belongs to {owner}, which is missing{instead}"
+        yield replace(needed(CELL, owner, line, beside=name), names=(name,))
     line = "exclude each other beside radii; one follows from the other"
     yield Rule(CELL, lambda cell: not has(cell, "radii", "fibres", "width"), line, names=("fibres", "width"))
     number = keys.keys_of(Cell)["fibres"].type.expected
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
-    line = "belongs to voids, which is missing"
-    yield replace(needed(CELL, "voids", line, beside="void_radius"), names=("void_radius",))
     line = f"expected {kinds.VOIDS_OF_A_RANDOM_CELL.expected}"
     yield Rule((*CELL, "voids"), lambda value: not isinstance(value, bool), line, (RANDOM,))
     line = "expected true or false: the mesh gives the voids"

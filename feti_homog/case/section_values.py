@@ -34,16 +34,6 @@ def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueT
     )
 
 
-def _positive_or_inf(what: str) -> types.ValueType:
-    """Return the type of numbers above 0; inf is stored as None."""
-    number = types.real(above=0.0)
-    return types.ValueType(
-        f"{what} above 0, or inf",
-        lambda value: number.accepts(value) or (isinstance(value, float) and value == math.inf),
-        lambda value: None if value == math.inf else float(value),
-    )
-
-
 TABLE_SUFFIXES = (".csv", ".txt", ".dat")
 TABLE_FILE = types.file_name("the name of a .csv file", *TABLE_SUFFIXES)
 NAMES_OF_COLUMNS = types.list_of(types.text, 'a list of names such as ["x", "y", "radius"]', least=3)
@@ -91,7 +81,10 @@ FIBRES = replace(
 KEPT = types.integer(least=2, most=10**9)
 STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", "peaks"), KEPT)
 PAIR = types.list_of(types.text, 'the names of two phases, such as ["coating", "matrix"]', count=2, unique=True)
-STRENGTH, STIFFNESS, CONDUCTANCE = map(_positive_or_inf, ("a traction", "a stiffness", "a conductance"))
+_UNLIMITED = replace(types.POSITIVE_OR_INF, store=lambda value: None if math.isinf(float(value)) else float(value))
+STRENGTH, STIFFNESS, CONDUCTANCE = (
+    replace(_UNLIMITED, expected=f"{noun} above 0, or inf") for noun in ("a traction", "a stiffness", "a conductance")
+)
 TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
 NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2, most=1000)
 _ANGLES = types.list_of(

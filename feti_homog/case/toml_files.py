@@ -85,7 +85,10 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> A
             words = TOO_DEEP if depth > MAX_DEPTH else f"{len(value)} {noun}; expected at most {most}"
             raise CaseError(f"{wording.dotted_key(path) or 'the file'}: {words}")
     if isinstance(value, Mapping):
-        named = _named_items(value, path, faults)
+        place = f"[{wording.dotted_key(path)}] " if path else ""
+        wrong = [name for name in value if not isinstance(name, str)]
+        faults += [f"{place}{name!r}: expected a string as key, not {_article(name)}" for name in wrong]
+        named = ((str(name), entry) for name, entry in value.items() if isinstance(name, str))
         return {name: _to_toml(entry, (*path, name), faults, depth + 1) for name, entry in named}
     if isinstance(value, list | tuple):
         return [_to_toml(entry, path, faults, depth + 1) for entry in value]
@@ -168,15 +171,6 @@ def _one_of(table: Any, name: str) -> Any:
 def short_digest(content: bytes) -> str:
     """Return the first 16 hexadecimal digits of a SHA-256 digest."""
     return hashlib.sha256(content).hexdigest()[:16]
-
-
-def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """Return the items of a table with string keys; every other key adds a line to `faults`."""
-    wrong = [name for name in table if not isinstance(name, str)]
-    if wrong:
-        place = f"[{wording.dotted_key(path)}] " if path else ""
-        faults += [f"{place}{name!r}: expected a string as key, not {_article(name)}" for name in wrong]
-    return [(str(name), value) for name, value in table.items() if isinstance(name, str)]
 
 
 def _article(value: object) -> str:

@@ -26,7 +26,7 @@ NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
     },
 }
 """Optional constants that each plane state needs."""
-OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
+OF_DATA_SHEETS = "axis 3 is along the fibres; for data sheets: E_axial, E_transverse, nu_axial, nu_transverse, G_axial"
 # Relative deviation, due to rounding, up to which a material counts as isotropic or transversely isotropic.
 ISOTROPY = 1e-9
 # Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.

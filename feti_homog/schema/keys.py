@@ -109,8 +109,7 @@ def key(
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
     required = default is dataclasses.MISSING
-    written = toml_value(list(default) if isinstance(default, tuple) else default)
-    words = absent or default_words or ("" if required or default is None else written)
+    words = absent or default_words or ("" if required or default is None else toml_value(default))
     entry = Key(type_, meaning, default=words, only=conditions, required=required, **attributes)
     return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 

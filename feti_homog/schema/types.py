@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema.wording import suggestion, toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Limits for magnitudes of numbers other than 0, so that products of a few numbers neither overflow nor underflow."""
@@ -50,21 +50,18 @@ class ValueType:
 
     def complaint(self, value: Any) -> str:
         """Return "expected ..." for an invalid value, empty for a valid value."""
-        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
+        if self.accepts(value):
+            return ""
+        advice = suggestion(value, self.options, {}) if self.options and isinstance(value, str) else "expected"
+        return f"expected {self.expected}{hint(value)}" + f"; {advice}" * (not advice.startswith("expected"))
 
 
-def _scatter(value: Any) -> str:
-    """Return a hint to `feti-homog uncertainty` for {mean, std} or {mean, cv}, also in a list; else empty."""
-    if isinstance(value, list):
-        return next(filter(None, map(_scatter, value)), "")
-    has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
-    return "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
-
-
-def magnitudes_in_words(value: Any) -> str:
-    """Return the magnitude limits in words if a number in `value` violates them; else empty."""
+def hint(value: Any) -> str:
+    """Return a hint on a number beyond the magnitude limits or a table of scatter, also in a list; else empty."""
     if isinstance(value, list | tuple):
-        return next(filter(None, map(magnitudes_in_words, value)), "")
+        return next(filter(None, map(hint, value)), "")
+    if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):
+        return "; `feti-homog uncertainty` takes scatter"
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
     return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""
 

@@ -3,7 +3,7 @@
 import difflib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 LONGEST_VALUE = 60  # characters of a value in a message
 # Names of quantities in other programs and textbooks, in lower case, and keys of this program for them.
@@ -12,18 +12,22 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion", "expansion_axial", "expansion_transverse")),
-    **dict.fromkeys(("strength", "bond_strength"), ("normal_strength", "tangential_strength")),
+    **dict.fromkeys(("strength", "bond_strength"), ("normal_strength", "tangential_strength", "max", "quadratic")),
     **dict.fromkeys(("tensile_strength", "xt", "compressive_strength", "xc"), ("normal_strength", "strength")),
     "shear_strength": ("tangential_strength", "strength"),
     **dict.fromkeys(("mu", "coefficient_of_friction", "friction_coefficient"), ("friction",)),
-    **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness")),
-    **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
+    **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness", "conductivity")),
+    **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy", "griffith", "lefm"), ("toughness", "energy")),
+    **dict.fromkeys(("cohesive", "czm", "cohesive_zone", "softening"), ("bilinear", "exponential")),
+    **dict.fromkeys(("brittle", "mohr", "mohr_coulomb", "coulomb"), ("max", "quadratic")),
+    **dict.fromkeys(("dt", "delta_t", "deltat", "temp"), ("temperature",)),
     "radius": ("fibre_radius",),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
 # Quantities and former keys without a key in this program, each with a hint.
 ABSENT = {
-    "g": "it follows from young and poisson",
+    **dict.fromkeys(("g", "mu"), "it follows from young and poisson"),
+    **dict.fromkeys(("strength", "peak"), 'strengths are in [material.PHASE] and [interface], peaks in type = "path"'),
     **dict.fromkeys(("diameter", "fibre_diameter", "fiber_diameter"), "give the radius (in [cell] fibre_radius)"),
     **{f"e{ij}": f"expected a shear strain as gamma{ij} = 2 E{ij}" for ij in (12, 13, 23)},
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
@@ -61,18 +65,18 @@ def dotted_key(path: Iterable[str]) -> str:
     return ".".join(map(toml_key, path))
 
 
-def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
+def suggestion(name: str, known: Collection[str], owners: Mapping[str, str]) -> str:
     """Return a hint for an unknown name: a synonym, a reason for its absence, its section, or valid names.
 
     `known` are the valid names, and `owners` maps every key of the file to its sections, in words.
     """
-    known = list(known)
-    if keys := [key for key in SYNONYMS.get(name.lower(), ()) if key in known]:
+    word = re.sub("[ -]", "_", name.lower())
+    if keys := [key for key in SYNONYMS.get(word, ()) if key in known]:
         return f"did you mean {' or '.join(keys)}?"
-    if name.lower() in ABSENT:
-        return ABSENT[name.lower()]
-    if name in owners:
-        return f"it belongs to {owners[name]}"
+    if word in ABSENT:
+        return ABSENT[word]
+    if key := next((key for key in (name, *SYNONYMS.get(word, ())) if key in owners), ""):
+        return f"{'it' if key == name else key} belongs to {owners[key]}"
     if nearest := difflib.get_close_matches(name, known, n=1):
         return f"did you mean {toml_key(nearest[0])}?"
     return "expected one of " + ", ".join(map(toml_key, known))

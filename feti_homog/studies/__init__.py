@@ -1,6 +1,6 @@
 """Run many cases from one file: sweeps, fits of constants to measured values, scatter from uncertain inputs.
 
-Imports `analysis`, `case`, `materials`, `microstructure`, `report`, `results`, `schema` and `system`.
+Imports `analysis`, `case`, `homogenization`, `materials`, `microstructure`, `report`, `results`, `schema` and `system`.
 Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,
 `uncertainty.load` and `study.Study`.
 """

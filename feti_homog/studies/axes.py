@@ -125,7 +125,7 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
         return f"{unknown[0]}: unknown key; expected one of {', '.join(sections.RANGE_KEYS)}"
     low, high, scale = value.get("from"), value.get("to"), value.get("scale", "linear")
     if not (types.is_number(low) and types.is_number(high) and low < high):
-        return f"expected numbers from < to{types.magnitudes_in_words([low, high])}"
+        return f"expected numbers from < to{types.hint([low, high])}"
     if scale not in ("linear", "log") or (scale == "log" and low <= 0):
         return 'expected scale = "linear", or "log" from a number above 0'
     step, count = value.get("step"), value.get("count")
@@ -134,7 +134,7 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
     if step is not None:
         width = high - low
         if not types.is_number(step) or not 0 < step <= width or scale == "log":
-            return f"expected a step above 0 and at most to - from, linear{types.magnitudes_in_words(step)}"
+            return f"expected a step above 0 and at most to - from, linear{types.hint(step)}"
         too_many = f"about {width / step:.6g} values; expected a step that makes at most {types.MOST_ROWS}"
         return too_many if width / step >= types.MOST_ROWS else ""
     if count is not None:

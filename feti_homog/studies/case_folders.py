@@ -25,9 +25,8 @@ from feti_homog.schema import types
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import file_locks, input_files
 
-INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
-    "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
-)  # fmt: skip
+INDEX_FILE, TABLE_FILE, ERROR_FILE = "sweep.json", "cases.csv", "error.txt"
+CASE_FILE, LOCK_FILE = "case.toml", "lock"
 SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
 """Files and folders that a sweep and its collection write beside sweep.json."""
 DOCUMENTS = (INDEX_FILE, "fit.json", "uncertainty.json")

@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 from feti_homog.analysis import description, runner, stepped_progress
 from feti_homog.case import Case, cases, sections
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+from feti_homog.homogenization import partition_policy, tile_tearing
 from feti_homog.studies import case_folders
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, case_names, expand
 from feti_homog.system.parallel import mpi_errors
@@ -50,13 +51,16 @@ def run_all(
     progress; with False it also prints a line for each case, and rank 0 a summary.
 
     Raises:
-        CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
+        CaseError: PETSc options or materials are faulty, `ranks_per_case` does not divide the rank count, or the folder
             cannot be used: it holds another sweep, or another process runs this sweep.
         ConvergenceError: cases failed; rank 0 prints the failures.
         FetiHomogError: a result could not be written; finished results are kept.
     """
     size = group_size(comm, ranks_per_case)
     check_options(sweep)
+    if sweep.cases[0].cell.has_own_mesh and "matrix" not in sweep.cases[0].materials:  # few meshes lack this phase
+        with suppress(MeshError):  # a fault of this case alone
+            mpi_errors.on_root_only(comm, tile_tearing.begin_mesh, sweep.cases[0], partition_policy.BY_COST.tiles)
     with _sweep_lock(directory, comm, sweep, shared=False):
         group: Any = comm if size == comm.size else comm.Split(comm.rank // size)
         if retry:

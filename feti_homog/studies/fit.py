@@ -121,7 +121,7 @@ class Fit(Study):
         return mpi_errors.on_root(evaluator.comm, write, evaluations.estimate())
 
     def text(self, document: Mapping[str, Any]) -> str:
-        return study_tables.fit_text(document, self.axes())
+        return study_tables.fit_text(document, self.axes(), self.first_cases().stress_unit)
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:

@@ -92,11 +92,7 @@ class FitReader:
             )
             return [], []
         rows = [{sections.MEASURED: measured}] if tests is None else tests
-        if (
-            not isinstance(rows, list)
-            or len(rows) > types.MOST_SECTIONS
-            or not all(isinstance(row, dict) for row in rows)
-        ):
+        if not isinstance(rows, list) or len(rows) > types.MOST_SECTIONS or {*map(type, rows)} - {dict}:
             words = f"expected sections [[{sections.TEST}]], at most {types.MOST_SECTIONS}"
             self.faults.append(f"{sections.TEST} = {wording.toml_value(rows)}: {words}")
             return [], []
@@ -146,10 +142,7 @@ class FitReader:
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None
-        reader = TableReader()
-        contents = reader.read(kind, value, section, f"{name}.")
-        self.faults += reader.faults
-        return contents
+        return TableReader(faults=self.faults).read(kind, value, section, f"{name}.")
 
 
 def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[toml_files.TomlPath, Any]]:

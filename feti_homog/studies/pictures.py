@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.plots import plot_helpers
+from feti_homog.report.text import tables
 from feti_homog.results import path_curves
 from feti_homog.studies.sweep_table import Series, SweepTable, series_over, varies
 from feti_homog.typing import Document
@@ -67,7 +68,8 @@ def moduli_figure(table: SweepTable) -> Figure:
         for number, one_series in enumerate(series):
             _plot_series(axes, table, one_series, name, number)
         unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
-        axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}\n{unit}".rstrip())
+        shear = r" ($\gamma_{12}$)" * (name == "C33" and names == [*PANELS])
+        axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}{shear}\n{unit}".rstrip())
         _limit(axes)
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
@@ -186,8 +188,10 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
         panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())
         panels[-1].locator_params(axis="x", nbins=6)
         plot_helpers.finish_curves(panels[-1])
-    title = f"{document['name']}: computed and measured"
+    title, case = f"{document['name']}: computed and measured", results[0]["case"] if results else {}
+    stress = case.get("output", {}).get("stress_unit", "")
     for name, number in document.get("unknowns", {}).items():
-        title += f"\n{name} = {number['estimate']:.5g}" + (f" ± {number['std']:.2g}" if number["std"] else "")
+        title += f"\n{tables.with_unit(name, stress)} = {number['estimate']:.5g}"
+        title += f" ± {number['std']:.2g}" if number["std"] else ""
     figure.suptitle(plot_helpers.plain(title))
     return figure

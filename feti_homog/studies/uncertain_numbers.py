@@ -72,7 +72,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
         if paths.count(path) > 1:
             faults.append(f"{name}: its standard deviation is given twice")
         if not types.is_number(value) or value <= 0:
-            words = f"expected a standard deviation above 0{types.magnitudes_in_words(value)}"
+            words = f"expected a standard deviation above 0{types.hint(value)}"
             faults.append(f"{name} = {wording.toml_value(value)}: {words}")
         elif number_at(document, path) is None:
             faults.append(f"{name}: expected a key of the case whose value is a number")

@@ -165,8 +165,7 @@ def _stiffness(document: Document) -> Float:
         text = f'analysis.type = "{analysis["type"]}" has no effective stiffness'
         raise CaseError(f'{text}; cards need "stiffness", "envelope" or "conductivity"')
     if analysis["plane"] != "generalized":
-        text = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
-        raise CaseError(text)
+        raise CaseError(f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"')
     if document.get("effective_stiffness_compression") is not None:
         raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
     C = numbers(document["effective_stiffness"], (6, 6))

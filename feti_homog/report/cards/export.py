@@ -18,6 +18,7 @@ components 11, 22, 33, 23, 13, 12 of a tensor, with half the engineering shears.
 """
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -49,16 +50,6 @@ FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
-def abaqus(material: effective_material.EffectiveMaterial) -> str:
-    """Return the Abaqus card."""
-    return _keyword_card(material, "ANISOTROPIC", ENGINEERING_SHEARS)
-
-
-def calculix(material: effective_material.EffectiveMaterial) -> str:
-    """Return the CalculiX card; an anisotropic material has TYPE=ANISO."""
-    return _keyword_card(material, "ANISO", TENSOR_SHEARS)
-
-
 def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: str, shears: Float) -> str:
     """Return the card of the keywords *MATERIAL, *ELASTIC and *EXPANSION.
 
@@ -83,6 +74,10 @@ def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: s
         lines += [f"** alpha11, alpha22, alpha33, alpha12, alpha13, alpha23; {kind} shears"] * bool(has_shears)
         lines += _data_lines((alpha * shears)[ABAQUS_ORDER] if has_shears else alpha[:3])
     return "\n".join(lines)
+
+
+abaqus = partial(_keyword_card, anisotropic="ANISOTROPIC", shears=ENGINEERING_SHEARS)
+calculix = partial(_keyword_card, anisotropic="ANISO", shears=TENSOR_SHEARS)
 
 
 def _data_lines(values: Iterable[float]) -> list[str]:

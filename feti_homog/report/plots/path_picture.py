@@ -122,7 +122,8 @@ def _line_style(values: Array, drawn: list[Array]) -> str:
 
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
     """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
-    points, rising, drawn = document["path"], _records(document), list[Array]()
+    points, drawn = document["path"], list[Array]()
+    rising = _records(points) if path_curves.is_proportional(document) else None
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
         count = np.array([point[key] for point in points])
@@ -139,11 +140,9 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
     axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
 
 
-def _records(document: Document) -> Array | None:
-    """Return the points that a rising load reaches on a proportional path; None for other paths."""
-    if not path_curves.is_proportional(document):
-        return None
-    load = np.array([point["load_factor"] for point in document["path"]])
+def _records(points: Sequence[Mapping[str, Any]]) -> Array:
+    """Return the numbers of the points that a rising load reaches."""
+    load = np.array([point["load_factor"] for point in points])
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
@@ -183,9 +182,9 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
         return None
     case, legs = document["case"], path_curves.legs(document)
     names = ("work", "stored", "stored_in_springs", "dissipated", "fracture_energy", "friction_heat")
-    rising, load = _records(document), np.array([point["load_factor"] for point in points])
+    rising = _records(points) if path_curves.is_proportional(document) else None
     if rising is None:  # the stack needs a position that rises
-        points = [points[k] for k in np.flatnonzero(load >= np.maximum.accumulate(load))]
+        points = [points[k] for k in _records(points)]
     work, stored, springs, lost, fracture, heat = (_column(points, name, rising) for name in names)
     if rising is not None:
         lost = _column(points, "dissipated_strain_controlled", rising)

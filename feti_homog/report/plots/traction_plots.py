@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,10 +64,9 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
             axes.set_title(f"{axes.get_title('left')} {axes.get_ylabel()}".strip(), loc="left")
             axes.set_ylabel("")
             axes.label_outer()
-    for first, *lower_axes in grid.T:
-        first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
-        lines = [line for axes in (first, *lower_axes) for line in axes.lines]
-        _limit(first, np.concatenate([np.asarray(line.get_ydata(), float) for line in lines]))
+    for column in grid.T:
+        column[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
+        _limit(column)
     if np.abs(last_state["jump"][:]).max() < SAME_PLACE**2 * file.attrs["width"]:
         grid[0][1].set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
     shaded = status[np.isin(fibre, chosen)]
@@ -77,7 +77,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     ]
     plot_helpers.legend_below(picture, patches)
     before, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {labels.label(last)}"
+    title = f"{last['label']}: {labels.label(last)}" + ", one of the loads" * (reported(document).name == "stiffness")
     if len(names) > 1:
         title += f" (dashed: {before['label']})" if stacked else f" (dashed: {before['label']}: {labels.label(before)})"
     if len(harmed) > len(chosen):
@@ -86,12 +86,19 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     return picture
 
 
-def _limit(axes: Axes, values: Array) -> None:
-    """Limit the ordinate if a few nodes at singular tips exceed all other values (n,)."""
+def _limit(column: Sequence[Axes]) -> None:
+    """Limit the common ordinate if a few nodes at singular tips exceed all other values; mark the hidden extremes."""
+    curves = [np.concatenate([np.asarray(line.get_ydata(), float) for line in axes.lines]) for axes in column]
+    values = np.concatenate(curves)
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
     low, high = 2.0 * low - high, 2.0 * high - low
     if high > low and (values.min() < low or values.max() > high):
-        axes.set_ylim(max(values.min(), low), min(values.max(), high))
+        column[0].set_ylim(max(values.min(), low), min(values.max(), high))
+        for axes, curve in zip(column, curves, strict=True):
+            ends = [f"▲ {curve.max():.3g}"] * bool(curve.max() > high)
+            ends += [f"▼ {curve.min():.3g}"] * bool(curve.min() < low)
+            if ends:
+                axes.text(0.99, 0.97, "\n".join(ends), ha="right", va="top", transform=axes.transAxes)
 
 
 def _chosen_states(file: Any, document: Document) -> list[str]:

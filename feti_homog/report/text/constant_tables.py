@@ -16,7 +16,7 @@ from feti_homog.report.text.tables import UNKNOWN, Column, Table, number, stress
 from feti_homog.typing import Document
 
 NAMES = Column("", -28)
-STIFF = ("C11", "C22", "C33")
+STIFF = ("C11", "C22", "C33 (gamma12)")
 STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the stress unit; other moduli are ratios
 ENGINEERING = ("E1", "E2", "E3", "G12", "G13", "G23", "nu12", "nu13", "nu23")
 THERMAL = {
@@ -245,7 +245,8 @@ def sensitivities(document: Document) -> list[Table]:
         shares.append([name, *(without_noise(slope * parameter / c) if c else UNKNOWN for slope, c in pairs)])
     text = "Elasticities, the relative change of a constant by that of a parameter"
     text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
-    heads = [(constants[k], max(12, len(constants[k]) + 2)) for k in at]
+    names = [STIFF[2] if constants[k] == "C33" and "C66" not in constants else constants[k] for k in at]
+    heads = [(name, max(12, len(name) + 2)) for name in names]
     return [
         Table(title, [Column("", -width), *(Column(*head, form) for head in heads)], rows)
         for title, form, rows in ((text, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))

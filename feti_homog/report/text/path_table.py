@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.case import load_sections
 from feti_homog.materials import voigt
-from feti_homog.report.text.point_tables import COUNTS, columns_without_noise, counts, debonded, energies
+from feti_homog.report.text.point_tables import COUNTS, STATES, columns_without_noise, debonded, energies
 from feti_homog.report.text.tables import WIDTH, Column, Table, stress_label, without_noise
 from feti_homog.results import landmarks, path_curves
 from feti_homog.typing import Document
@@ -38,7 +38,7 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     rows = [
-        [k, *(without_noise(column[k]) for column in first.values()), points[k]["load_factor"], *counts(points[k])]
+        [k, *(without_noise(column[k]) for column in first.values()), *map(points[k].get, ("load_factor", *STATES))]
         for k in numbers
     ]
     columns = [Column(noun := document["case"]["path"]["method"].removesuffix("s"), len(noun), "d")]

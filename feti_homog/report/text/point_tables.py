@@ -30,7 +30,7 @@ ONSET = {
 RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
          Column("angle", 9))  # fmt: skip
 SECTION = Column("interface", 11, "d")  # for cases with several sections
-LAST_STRAIN = "bonded, open, closed: interface nodes under the unit strain gamma12"
+LAST_STRAIN = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
 TIP_TITLE = "Largest energy release rate"
 
 Point = Mapping[str, Any]
@@ -95,10 +95,6 @@ def debonded(document: Document, point: Point) -> list[str]:
         pairs = [f"{100 * share:.1f} % of {' and '.join(section['between'])}" for section, share in shares]
         text += f"; {', '.join(pairs)}"
     return wrap(text, WIDTH)
-
-
-def counts(point: Point) -> list[int]:
-    return [point[state] for state in STATES]
 
 
 def envelope_table(document: Document, limit: int | None = None) -> Table:

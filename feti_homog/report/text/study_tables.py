@@ -11,7 +11,7 @@ FIRST, NUMBERS = tables.Column("", -38), ("value", "std", "computed", "residual"
 LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
-def fit_text(document: Document, axes: str = "") -> str:
+def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
     """Return the fit tables: unknowns, correlations, measured values.  `axes` is a remark on misleading names."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
@@ -27,7 +27,7 @@ def fit_text(document: Document, axes: str = "") -> str:
         best = [f"{data[k]} {unknown['shares'][k]:.0%}" for k in order if unknown["shares"][k] >= LEAST_SHARE]
         bound = "" if unknown["at_bound"] is None else f"at its {unknown['at_bound']} bound; "
         numbers = [unknown["estimate"], *map(_dash, [unknown["std"], *unknown["interval"]])]
-        rows.append([name, *numbers, f"  {bound}{', '.join(best)}"])
+        rows.append([tables.with_unit(name, stress_unit), *numbers, f"  {bound}{', '.join(best)}"])
     printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
     columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]

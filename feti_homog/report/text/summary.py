@@ -218,7 +218,9 @@ def phase_tables(document: Document) -> list[Table]:
     pairs = [(phase, k) for k in states for phase in phases]
     names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
     first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
-    heads = [first, *(column for title in STRESSES.values() for column in (Column(title), Column("at", 16)))]
+    unit = with_micro(document["case"].get("output", {}).get("length_unit", ""))
+    at = Column(head := f"at x, y{f' ({unit})' * bool(unit)}", max(16, len(head) + 1))
+    heads = [first, *(column for title in STRESSES.values() for column in (Column(title), at))]
     rows = [
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
         for name, (phase, k) in zip(names, pairs, strict=True)
@@ -239,7 +241,7 @@ def phase_tables(document: Document) -> list[Table]:
             used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
             used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
             used[-1] += [load[name] / value if value else UNKNOWN for name in stresses]
-    heads = [first, Column("criterion", 20), Column("utilisation"), Column("at", 16)]
+    heads = [first, Column("criterion", 20), Column("utilisation"), at]
     heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
     heads += [Column(f"at {name}") for name in stresses]
     alone = "".join(f", at this {name}," for name in stresses)

@@ -13,6 +13,7 @@ def debonded(arc: str, *lines: str) -> str:
 
 
 ARC = "{fibre = 1, angle = 60}"
+ONE_OF_ALL = 'expected one of "max", "quadratic", "energy", "bilinear", "exponential", "table"'
 PATH = "[path]\nstrain = [0.2, 0, 0]"
 ANGLE = "[angle]\nvalues = [0, 30]"
 BARE_ARC = "[interface]\ndebonded = [{fibre = 1}]"
@@ -25,6 +26,11 @@ FAULTY_BONDINGS: dict[str, str] = {
         "[interface] tangential_strength = -inf": "expected a traction above 0, or inf",
         "[interface] tangential_strength = nan": "expected a traction above 0, or inf",
         '[interface] criterion = "mohr"': 'expected one of "max", "quadratic"',
+        '[interface] law = "CZM"': f"{ONE_OF_ALL}; did you mean bilinear or exponential?",
+        '[interface] law = "cohesive zone"': f"{ONE_OF_ALL}; did you mean bilinear or exponential?",
+        '[interface] law = "Mohr-Coulomb"': f"{ONE_OF_ALL}; did you mean max or quadratic?",
+        '[interface] law = "strength"': f"{ONE_OF_ALL}; did you mean max or quadratic?",
+        '[interface] law = "bilinar"': f"{ONE_OF_ALL}; did you mean bilinear?",
         '[interface] growth = "springs"': "belongs to ",
         "[interface] scatter = 8": "expected a table such as {shape = 8.0, seed = 1}",
         "[interface] normal_stiffness = 0.0": "expected",

@@ -45,6 +45,10 @@ FAULTY_CASES = {
         "[cell] fibres = 50": 'belongs to geometry = "random", not "hexagonal"',
         '[cell] file = "cell.msh"': 'belongs to geometry = "table" or "mesh" or "pixels", not "hexagonal"',
         '[analysis] type = "stifness"': 'expected one of "stiffness"',
+        '[analysis] type = "strength"': 'expected one of "stiffness", "angle", "path", "load", "envelope", '
+            '"conductivity"; strengths are in [material.PHASE] and [interface], peaks in type = "path"',
+        "[analysis] strength = 60.0": "unknown key; strengths are in [material.PHASE] and [interface], peaks in type =",
+        "[analysis] delta_T = -100.0": "unknown key; temperature belongs to [envelope] or a load of [path] to or",
         '[analysis] plane = "plane strain"': 'expected one of "strain", "stress", "generalized"',
         "[decomposition] subdomains = 0": "expected an integer at least 1",
         "[decomposition] max_dofs = 3": "expected an integer at least 100",

@@ -1,6 +1,6 @@
 """Case files with faults of loads by name, of [path] and [load], below the words that must report them."""
 
-from support.base_case import faults
+from support.base_case import AXIAL, FIBRE, TRANSVERSE, faults
 from unit.case.faulty_bonding import ARC, PATH, of_type
 
 IN_SPACE = '[analysis] plane = "generalized", not "strain"'
@@ -59,6 +59,10 @@ FAULTY_LOADS: dict[str, str] = {
         path("waypoints = [{S11 = 1.0}, {temperature = -100.0}, {temperature = 0.0}]", state="generalized"),
     "[material.matrix] expansion: missing; [load] to.temperature needs it":
         load("to = {temperature = -100.0}", state="generalized").replace("0.222", "0.222\nexpansion = 1e-6"),
+    "[material.fibre] expansion_axial, expansion_transverse, or one expansion: missing; [load] to.temperature needs it":
+        load("to = {temperature = -100.0}", state="generalized").replace("0.299", "0.299\nexpansion = 1e-5")
+        .replace(FIBRE, f"[material.fibre]\n{TRANSVERSE}{AXIAL}G_axial = 15.0\n"),
+    "[load] to.dT = -100.0: unknown key; did you mean temperature?": load("to = {dT = -100.0}", state="generalized"),
     '[path] to.S11 = "60": expected a number': path('to = {S11 = "60"}'),
     "[load] to.E11 = true: expected a number": load("to = {E11 = true}"),
     "[path] to.S11 = nan: expected a number": path("to = {S11 = nan}"),

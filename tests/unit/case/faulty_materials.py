@@ -87,6 +87,9 @@ FAULTY_MATERIALS: dict[str, str] = {
     "[material.fibre] young, poisson (isotropic) and angle (orthotropic): exclude each other":
         fibre("young = 1.0\npoisson = 0.2\nangle = 30.0\n"),
     "[material.fibre] G12: missing": fibre("E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\n", "stress"),
+    "[material.fibre] E2: missing\n[material.fibre] nu12: missing\n"
+    "[material.fibre] G12: missing; expected a number above 0; axis 3 is along the fibres; for data sheets: E_axial":
+        fibre("E1 = 230.0\n"),
     "[material.fibre] E3, nu13, nu23: missing; plane strain needs them": fibre(ORTHOTROPIC),
     "[material.fibre] E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance":
         fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4")),
@@ -163,6 +166,11 @@ FAULTY_MATERIALS: dict[str, str] = {
     '[output] stress = "S11": belongs to [analysis] type = "stiffness"': conducting("[output]", 'stress = "S11"'),
     '[output] deformation_scale = 2.0: belongs to [analysis] type = "stiffness"':
         conducting("[output]", "deformation_scale = 2.0"),
+    '[analysis] plane = "strain": expected "conduction", or no plane\n'
+    '[material.fibre] conductivity: missing; [analysis] type = "conductivity" needs it':
+        conducting(fibre=GIVEN).replace('type = "conductivity"', 'type = "conductivity"\nplane = "strain"'),
+    "[material.fibre] k = 1.0: unknown key; did you mean conductivity?\n[material.fibre] conductivity: missing; exp":
+        conducting(fibre="k = 1.0"),
     '[analysis] plane = "strain": expected "conduction", or no plane, in type = "conductivity"':
         conducting().replace('type = "conductivity"', 'type = "conductivity"\nplane = "strain"'),
     '[analysis] plane = "conduction": belongs to type = "conductivity"': cell('"strain"', '"conduction"'),

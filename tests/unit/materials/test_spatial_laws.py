@@ -192,8 +192,8 @@ def test_constants_that_a_plane_state_does_not_need_may_be_absent():
         (dataclasses.replace(AS4, nu_axial=None), "^nu_axial: missing; generalized plane strain needs it$"),
         (
             dataclasses.replace(ORTHOTROPIC, E3=None, G23=None),
-            "^E3, G23: missing; generalized plane strain needs them; axis 3 is along the fibres: with constants of "
-            "a data sheet give E_axial, E_transverse, nu_axial, ...$",
+            "^E3, G23: missing; generalized plane strain needs them; axis 3 is along the fibres; for data sheets: "
+            "E_axial, E_transverse, nu_axial, nu_transverse, G_axial$",
         ),
         (Isotropic(1.0, 0.5), "less than 0.5 in generalized plane strain"),
         (General(rows(np.eye(3))), "^stiffness: expected 6x6 in generalized plane strain"),

@@ -234,7 +234,7 @@ def test_bounds_stand_on_both_sides_of_what_was_computed() -> None:
     assert table.cells == [
         ["C11 Reuss, Voigt", "7", "9", "10"],
         ["C22 Reuss, Voigt", "6.5", "8", "8.5"],
-        ["C33 Reuss, Voigt", "2.5", "3", "3.5"],
+        ["C33 (gamma12) Reuss, Voigt", "2.5", "3", "3.5"],
         ["bulk Hashin-Shtr.", "1", "1.5", "2"],
     ]
     result["bounds"]["reuss"][0][0] = 9.5

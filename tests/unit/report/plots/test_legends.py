@@ -232,7 +232,7 @@ def test_curves_against_the_angle_have_their_names_and_units(kind: str) -> None:
     named = {name: values for name, values in found.items() if name.startswith("$")}
     assert len(named) >= 3
     for name, values in named.items():
-        place = float("".join(letter for letter in name if letter.isdigit()))
+        place = float("".join(letter for letter in name.partition(" (")[0] if letter.isdigit()))
         assert list(values) == [place, 2 * place], name
 
 
@@ -240,7 +240,9 @@ def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypa
     """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
     whole = sample(4)
     write(tmp_path, in_space(whole), None)
-    traction, jump, *_ = panels(drawn(tmp_path, monkeypatch)["interface.png"])
+    picture = drawn(tmp_path, monkeypatch)["interface.png"]
+    assert picture.get_suptitle().endswith(", one of the loads")
+    traction, jump, *_ = panels(picture)
     assert (traction[1], jump[1]) == ("traction (GPa)", "jump (mm)")
     k = np.arange(10.0)
     values = {r"$t_\mathrm{n}$": k, r"$t_\mathrm{t}$": -k, r"$t_\mathrm{a}$": k}

@@ -1,6 +1,7 @@
 """The picture of sensitivities, a heat map."""
 
 import numpy as np
+import pytest
 
 from feti_homog.report.plots import response_curves
 
@@ -18,3 +19,23 @@ def test_heat_map_has_the_elasticities() -> None:
     assert [label.get_text() for label in axes.get_xticklabels()] == ["C11", "C12"]
     np.testing.assert_allclose(np.ma.filled(axes.images[0].get_array(), np.nan)[:, 0], [2.0, 0.0])
     assert response_curves.sensitivities({"case": {}}) is None
+
+
+@pytest.mark.parametrize(("constants", "head"), [(["C33"], "C33 (gamma12)"), (["C33", "C66"], "C33")])
+def test_the_third_entry_is_a_shear_in_the_plane_alone(constants, head) -> None:
+    count = len(constants)
+    found = {
+        "parameters": ["material.fibre.young"], "parameter_values": [2.0],
+        "constants": constants, "constant_values": [1.0] * count, "derivatives": [[0.5]] * count,
+    }  # fmt: skip
+    picture = response_curves.sensitivities({"case": {}, "sensitivities": found})
+    assert picture is not None and picture.axes[0].get_xticklabels()[0].get_text() == head
+
+
+def test_angles_name_the_shear() -> None:
+    points = [{"angle": angle, "stiffness": np.diag([3.0, 2.0, 1.0]).tolist()} for angle in (0.0, 90.0)]
+    case = {"name": "a", "analysis": {"plane": "strain"}, "interface": {"contact": True}}
+    lines = response_curves.angle({"case": case, "angle": points}).axes[0].lines[:4]
+    assert [line.get_label() for line in lines] == [
+        "$C_{11}$", "$C_{22}$", "$C_{12}$", r"$C_{33}$ ($\gamma_{12}$)",
+    ]  # fmt: skip

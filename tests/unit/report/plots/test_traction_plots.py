@@ -12,7 +12,7 @@ from support.sample_output import Sample, sample
 
 from feti_homog.report.plots.cell_picture import write_fibre_numbers
 from feti_homog.report.plots.drawn_cell import DrawnCell
-from feti_homog.report.plots.traction_plots import Coordinate, coordinate
+from feti_homog.report.plots.traction_plots import Coordinate, _limit, coordinate
 from feti_homog.results.field_file import FieldFile
 
 CORNERS = np.array([[0.75, 0.25], [0.75, 0.75], [0.25, 0.75], [0.25, 0.25]])
@@ -87,6 +87,21 @@ def test_round_fibres_have_directions(tmp_path: Path) -> None:
     place, _ = found(path, 1, 100_000)
     assert place.ends == (-180.0, 180.0)
     np.testing.assert_allclose(place.values, [-90.0] * 5 + [90.0] * 5)
+
+
+def test_values_beyond_the_axes_are_marked_in_their_panel() -> None:
+    upper, lower = panels = Figure().subplots(2, 1, sharey=True)
+    wave = np.sin(np.linspace(0.0, 7.0, 300))
+    upper.plot(np.append(wave, [40.0, -30.0]))
+    lower.plot(np.append(wave, 20.5))
+    _limit(panels)
+    low, high = lower.get_ylim()
+    assert -30.0 < low < -1.0 and 1.0 < high < 20.5
+    assert [text.get_text() for axes in panels for text in axes.texts] == ["▲ 40\n▼ -30", "▲ 20.5"]
+    smooth = Figure().subplots()
+    smooth.plot(wave)
+    _limit([smooth])
+    assert not smooth.texts
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.constant_tables import cell_constants, moduli, stiffnesses
 from feti_homog.report.text.point_tables import angle_table, components, envelope_table
+from feti_homog.report.text.summary import STRESSES, phase_tables
 from feti_homog.report.text.tables import Column, Table
 
 
@@ -90,10 +91,24 @@ def test_what_rounding_leaves_of_zero_is_zero(angle, expected):
     assert components({"angle": angle, "factor": 3.0}) == pytest.approx(expected, abs=1e-300)
 
 
+@pytest.mark.parametrize(
+    ("unit", "head"), [("", "at x, y"), ("um", "at x, y (µm)"), ("micrometres", "at x, y (micrometres)")]
+)
+def test_places_of_largest_stresses_are_coordinates_with_a_unit(unit, head):
+    measures = (*STRESSES, "utilisation")
+    phase = {"phase": "fibre", "state": ["E11"], "criterion": "principal"} | {name: [2.0] for name in measures}
+    phase |= {f"{name}_at": [[0.25, 0.5]] for name in measures}
+    largest, used = phase_tables({"case": {"output": {"length_unit": unit}}, "phase_stresses": [phase]})
+    assert [column.name for column in largest.columns[2::2]] == [head] * 3 and used.columns[3].name == head
+    for table in (largest, used):
+        heads, (cells,) = table.lines[1], table.lines[2:3]
+        assert heads.index(head) + len(head) == cells.index("0.25, 0.5") + len("0.25, 0.5")
+
+
 def test_counts_of_nodes_of_an_angle_name_their_unit_strain():
     """Each of the three unit strains opens and closes other nodes."""
     counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
-    words = "bonded, open, closed: interface nodes under the unit strain gamma12"
+    words = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
     stiffness, stress = {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}, {"stress": [1.0, 2.0, 3.0]}
     assert words in angle_table({"case": {}, "angle": [counts | stiffness]}).lines
     assert words not in angle_table({"case": {}, "angle": [counts | stress]}).lines

@@ -35,6 +35,7 @@ def test_an_unknown_with_a_scatter_beyond_its_bounds_is_named(slope, status):
     assert found["status"] == status
     remark = "Remark: material.fibre.young: the interval reaches beyond the bounds, which it ignores"
     assert study_tables.fit_text(found).endswith(remark) == (slope < 0.0196)
+    assert "  material.fibre.young (GPa)  " in study_tables.fit_text(found, stress_unit="GPa")
     assert [line.partition(": its")[0] for line in found["faults"]] == (
         [] if status == "done" else ["[unknown] material.fibre.young: the measured values hardly determine it"]
     )

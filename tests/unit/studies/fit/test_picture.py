@@ -63,7 +63,10 @@ def test_curves_of_results_are_whole_with_units():
     }
     row = {"test": 1, "name": "S22", "strain_name": "E11", "residual": 0.0, "std": 1.0}
     rows = [row | {"strain": 0.1 * k, "value": 5.0, "computed": 8.0 / k} for k in (1.0, 2.0)]
-    (axes,) = pictures.fit_figure({"name": "fit", "measured": rows}, [{"case": case, "path": points}]).axes
+    document = {"name": "fit", "measured": rows, "unknowns": {"material.fibre.E_axial": {"estimate": 2.0, "std": 0.25}}}
+    figure = pictures.fit_figure(document, [{"case": case, "path": points}])
+    assert figure.get_suptitle() == "fit: computed and measured\nmaterial.fibre.E_axial (MPa) = 2 ± 0.25"
+    (axes,) = figure.axes
     assert axes.get_ylabel() == r"stress $\Sigma_{22}$ (MPa)"
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     np.testing.assert_allclose(named["test 1, computed"].get_xydata(), [[0, 0], [0.1, 8], [0.1, 2], [0.2, 4]])
