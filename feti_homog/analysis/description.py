@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition import shared_entities
 from feti_homog.homogenization import cell_remarks, domain_partition, partition_policy, phase_laws, tile_tearing
-from feti_homog.mesh import ReferenceLattice
+from feti_homog.mesh import ReferenceLattice, refinement
 from feti_homog.microstructure import phase_names
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
@@ -26,26 +26,27 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
         part = tile_tearing.cut(case, lattice, comm, partition_policy.BY_COST)
         constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
-        loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
-        c = phase_laws.problems(case)[0].components
-        options, summary, multipliers = solver_plan.database_options(), part.summary, c * constraints
+        inner, parts = lattice.intervals - 1, map(refinement.halved, part.submeshes.cut())
+        nodes = sum(len(s.class_keys) + inner * (len(s.edge_keys) + (inner - 1) * len(s.triangles) // 2) for s in parts)
+        loads = comm.gather((len(part.submeshes.index), nodes)) or []
+        c = [problem.components for problem in phase_laws.problems(case)]
+        options, summary, multipliers = solver_plan.database_options(), part.summary, c[0] * constraints
         pieces = f"{summary.subdomains} subdomain{'s' * (summary.subdomains > 1)}"
 
         def described() -> str:
-            cell, subdomains = case.cell, [count for count, _ in loads]
-            nodes = [coarse_triangles * lattice.intervals**2 // 2 for _, coarse_triangles in loads]
-            elements = summary.coarse_triangles * len(lattice.triangles)
+            cell, (subdomains, nodes) = case.cell, zip(*loads, strict=True)
             unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge, summary.radii)
             sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
             lines = [
                 f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
                 f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
                 *([f"voids      {summary.voids}"] if summary.voids else []),
-                f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
-                f"elements of order {cell.order}, about {c * sum(nodes)} degrees of freedom",
+                f"mesh       {summary.coarse_triangles} coarse triangles, "
+                f"{summary.coarse_triangles * len(lattice.triangles)} elements of order {cell.order}, "
+                f"{sum(c) * sum(nodes)} degrees of freedom",
                 *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
                 *_fibre_lines(case, summary),
-                f"tearing    {summary.bodies} bodies, {pieces}, {multipliers} multipliers",
+                f"tearing    {summary.bodies} bodies, {pieces}, {sum(c) * constraints} multipliers",
                 *_cost_lines(case, summary, multipliers, options, subdomains, nodes),
                 *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
                 *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
@@ -81,7 +82,7 @@ def _cost_lines(
     yield f"solver     {solver}"
     components = [problem.components for problem in problems]
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
-        yield f"rank {rank:<5} {count} subdomain{'s' * (count > 1)}, about {components[0] * n} degrees of freedom"
+        yield f"rank {rank:<5} {count} subdomain{'s' * (count > 1)}, {sum(components) * n} degrees of freedom"
     columns = multipliers if plan.preconditioner == "influence" else 0
     memory = partition_policy.memory(nodes, subdomains, components, columns)
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
@@ -90,9 +91,8 @@ def _cost_lines(
     few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
     yield f"estimate   on {ranks} {noun} at most about {few} per rank{all_bonds}, without pictures"
     most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one rank per body")
-    recommended = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
-    reason = f"{partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit}"
-    yield f"ranks      recommended: {recommended} ({reason})"
+    useful = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
+    yield f"ranks      recommended: {useful} ({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})"
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:

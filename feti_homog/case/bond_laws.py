@@ -40,10 +40,10 @@ class BondLawEntry:
         fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
             return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
-        stiffness = (
-            "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
-        )
-        return f"{fault}, such as {stiffness}" if name == STIFFNESSES[0] else fault
+        if name == COHESIVE[0] and "between" in table:
+            return f"{fault}; bonds that hold have 100 times the strengths and 1e4 times the toughnesses of others"
+        such = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
+        return f"{fault}, such as {such}" if name == STIFFNESSES[0] else fault
 
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")

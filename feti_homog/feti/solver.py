@@ -146,8 +146,8 @@ class FetiSolver:
     def stress_integral(self, solution: DualSolution) -> Float:
         """Compute |UC| Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
         local = self.d.T @ solution.lam
-        if self.is_pulled and solution.alpha is not None:
-            local = local + self._pushes.T @ solution.alpha[self.natural.owned_modes]
+        if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:
+            local = local + self._pushes.T @ alpha[self.natural.owned_modes]
         return np.asarray(self.torn_stiffness @ solution.strain + self.comm.allreduce(local))
 
     def set_state(self, active: Float, compliance: Float) -> None:

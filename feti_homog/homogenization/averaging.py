@@ -280,12 +280,10 @@ class FibreInterfaces:
 
     def shares(self, status: Status) -> Float:
         """Return the debonded length fraction (i,) of each [[interface]] section, 0 without nodes.  Collective."""
-        length, debonded = (
-            np.bincount(self._nodes.pair, values, self._pairs).astype(float)
-            for values in (self._nodes.length, self._nodes.length * (status != Contact.BONDED))
-        )
-        length = distributed_arrays.allreduce_sum(self._comm, length)
-        return np.asarray(distributed_arrays.allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
+        weights = np.stack([self._nodes.length, self._nodes.length * (status != Contact.BONDED)])
+        sums = [np.bincount(self._nodes.pair, row, self._pairs).astype(float) for row in weights]
+        length, debonded = distributed_arrays.allreduce_sum(self._comm, np.stack(sums))
+        return np.asarray(debonded / np.where(length > 0, length, 1.0))
 
 
 def asymmetry(L: Float) -> float:

@@ -38,7 +38,7 @@ FACTOR_BYTES = 2.9e2
 # and 120 to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense
 # matrices of debonded faces with friction (`interface.friction`) also take PAIR_BYTES for each pair of jumps.
 PATH_BYTES, PAIR_BYTES = 7e4, 50
-# Degrees of freedom below which a further rank waits longer than it computes.
+# Degrees of freedom below which a rank waits longer than it computes: 57 500 take as long on two ranks as on one.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers for the choice of operators; the iterations with coatings are counted without influence columns.
 ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 400, 3, 100
@@ -194,7 +194,7 @@ def recommended_ranks(dofs: int, bodies: int) -> int:
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
     that are cut across materials, `bodies` counts coarse triangles.
     """
-    return max(1, min(bodies, -(-dofs // DOFS_OF_A_RANK)))
+    return max(1, min(bodies, dofs // DOFS_OF_A_RANK))
 
 
 def in_words(size: float) -> str:

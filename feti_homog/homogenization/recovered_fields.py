@@ -115,11 +115,13 @@ def error_shares(cell: TornCell, response: Response) -> Float:
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
     """Name the places at which stresses of plane states would grow without limit on finer meshes.  Collective."""
     places = {"corners of fibres"} if cell.summary.has_corners else set[str]()
-    is_rigid = any(bond.normal_stiffness is None for bond in cell.case.interfaces)
-    masks = [s.state.status == Contact.BONDED for s in states if is_rigid and s is not None and s.debonded]
-    length = FibreInterfaces(cell).length if masks else None
-    if length and any(np.minimum(length(bonded), length(~bonded)).any() for bonded in masks):
-        places.add("tips of debonding")
+    nodes, rigid = cell.solver.jump_operator.nodes, np.array([b.normal_stiffness is None for b in cell.case.interfaces])
+    masks = [s.state.status == Contact.BONDED for s in states if rigid.any() and s is not None and s.debonded]
+    if masks:
+        length, inner = FibreInterfaces(cell).length, cell.summary.is_fibre[nodes.fibre]
+        sides = [rigid[nodes.pair] & on for on in (inner, ~inner)]  # a coated fibre may have two interfaces
+        if any(np.minimum(length(bonded & on), length(~bonded & on)).any() for bonded in masks for on in sides):
+            places.add("tips of debonding")
     return places
 
 

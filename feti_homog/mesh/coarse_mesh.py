@@ -99,11 +99,6 @@ class CoarseMesh:
         mesh = replace(self, width=factor * self.width, height=factor * self.height, points=factor * self.points)
         return replace(mesh, ellipses=self.ellipses.scaled(factor))
 
-    @property
-    def circles(self) -> Float:
-        """The centre and radius (k, 3) of each ellipse; the radius is NaN unless the ellipse is round."""
-        return self.ellipses.circles
-
 
 def areas(points: Float, triangles: Int32) -> Float:
     """Compute the signed areas (m,) of triangles, positive counter-clockwise."""

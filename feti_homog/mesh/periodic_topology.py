@@ -122,7 +122,7 @@ class Torus:
     def edge_circles(self) -> Float:
         """The circle (e, 3), centre and radius, of each plane edge: radius NaN on ellipses, 0 for straight edges."""
         circles = np.zeros((len(self.edges), 3), float if len(self.arcs) else np.float16)  # small in label images
-        circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
+        circles[self.arcs] = self.mesh.ellipses.circles[self.mesh.arc_circle]
         return circles
 
     @cached_property

@@ -147,7 +147,7 @@ def _mesh(rng: np.random.Generator, most: int, folder: Path) -> DrawnCell:
     mesh = generate(Cell(**cell), {})
     kept = np.ones(len(mesh.triangles), bool)
     if count > 1 and rng.random() < 0.3:
-        x, y, radius = mesh.circles[-1][:3]
+        x, y, radius = mesh.ellipses.circles[-1][:3]
         away = mesh.points[mesh.triangles].mean(axis=1) - [x, y]
         away -= np.round(away / mesh.period) * mesh.period
         kept, count = np.hypot(*away.T) > radius, count - 1

@@ -83,6 +83,7 @@ REFUSED = {
     "solvers": {
         "-feti_ksp_type cgg": "PETSc has no such Krylov method",
         "-feti_sub_pc_factor_mat_solver_type x": "",
+        "-feti_schur_mat_mumps_icntl_8 -1": "INFOG(1)=-22",  # scaling by vectors that no option gives
         "-feti_interior_pc_factor_mat_solver_type nolib -feti_interior_x 1": "",
     },
     "unread": {

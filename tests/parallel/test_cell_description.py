@@ -1,12 +1,16 @@
 """`check` describes the solver that a run makes."""
 
+import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.base_case import changed
+from support.label_images import RUN, circles_in_pixels
 
 from feti_homog import Case, CaseError, run
+from feti_homog.analysis.cell_records import SolverInfo
 from feti_homog.analysis.description import describe
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
@@ -25,6 +29,7 @@ SQUARE = """geometry = "table"
 width = 1.0
 height = 1.0
 fibre_list = [{x = 0.5, y = 0.5, radius = 0.35, sides = 4, angle = 45.0}]"""
+BODIES = '[decomposition]\ncut = "bodies"\n'
 CASES = {
     "bonded": changed(("mesh_size = 0.05", "mesh_size = 0.2")),
     "cut": changed(("mesh_size = 0.05", "mesh_size = 0.05\nrefine = 1")),
@@ -33,6 +38,7 @@ CASES = {
     "coated, implicit": changed(*COATED, end=f'{COATING}[petsc]\nfeti_dual_operator = "implicit"\n'),
     "polygon": changed(('geometry = "hexagonal"\nfibre_fraction = 0.4', SQUARE), ("= 0.05", "= 0.2")),
     "bonded, influence": changed(end='[petsc]\nfeti_pc_type = "influence"\n'),
+    "in space": changed(('plane = "strain"', 'plane = "generalized"'), ("= 0.05", "= 0.1\norder = 2"), end=BODIES),
 }
 
 
@@ -46,7 +52,29 @@ def test_the_solver_is_the_one_that_is_reported(comm, name):
     (line,) = [line for line in printed.splitlines() if line.startswith("solver")]
     assert ("influence columns" in line) == (cell.solver.exact_inverse is not None)
     assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)
+    assert_same_sizes(comm, printed, cell)
+
+
+def assert_same_sizes(comm, printed, cell):
+    """Compare the numbers of `check` with the numbers in result.json.  Collective."""
+    sizes = SolverInfo.of(cell, (), ())
+    total, *of_ranks = map(int, re.findall(r"(\d+) degrees of freedom$", printed, re.MULTILINE))
+    assert (total, len(of_ranks), sum(of_ranks)) == (sizes.dofs, comm.size, sizes.dofs)
+    assert f", {sizes.multipliers} multipliers\n" in printed
     cell.destroy()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_pixels_have_the_degrees_of_freedom_of_a_run(comm, shared_path, order):
+    path = shared_path / "image.npy"
+    if comm.rank == 0:
+        np.save(path, circles_in_pixels(20))
+    comm.barrier()
+    cell = {"geometry": "pixels", "file": str(path), "labels": {"0": "matrix", "1": "fibre"}, "order": order}
+    case = Case.parse(RUN | {"cell": cell})
+    with case_options(case.petsc):
+        printed = comm.bcast(describe(case, comm))
+        assert_same_sizes(comm, printed, tear(case, comm, Progress(comm, quiet=True), policy=BY_COST))
 
 
 def test_only_paths_have_the_memory_of_complete_debonding(comm):

@@ -146,6 +146,23 @@ def test_stresses_rise_beside_tips_and_corners(comm):
     assert "they rise" not in remarks(CELL)
 
 
+def test_only_tips_in_one_rigid_interface_raise_stresses(comm):
+    """A coated fibre has two interfaces: one may part all around, or have springs."""
+    cell = {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.1}
+    materials = {"matrix": MATRIX, "coating": MATRIX, "fibre": FIBRE}
+    springs = {"normal_stiffness": 100.0, "tangential_stiffness": 100.0}
+    for angle, bond, has_tips in ((360.0, {}, False), (90.0, {}, True), (90.0, springs, False)):
+        inside = {"between": ["fibre", "coating"], "debonded": [{"fibre": "all", "angle": angle}]} | bond
+        document = {
+            "cell": cell,
+            "material": materials,
+            "analysis": {"type": "stiffness", "plane": "strain"},
+            "interface": [inside, {"between": ["coating", "matrix"], "debonded": []}],
+        }
+        remarks = " ".join(run(Case.parse(document), comm, fields=True).remarks)
+        assert ("beside tips of debonding" in remarks) == has_tips, remarks
+
+
 def test_a_soft_phase_keeps_its_stresses_and_a_free_fibre_has_none(comm):
     soft, softer = (
         phases_of(comm, {"E11": 0.01}, fibre=FIBRE | {"young": young}, plane="strain")["fibre"]

@@ -75,13 +75,13 @@ def test_normals_are_radii_of_the_fibres(torus, comm):
     for intervals in (1, 2):
         _, share = shared_by_ranks(torus, comm, intervals)
         at = share.fibre >= 0
-        radius = torus.mesh.circles[0, 2]
+        radius = torus.mesh.ellipses.circles[0, 2]
         length = np.linalg.norm(share.normal, axis=-1)
         edges = at & share.is_edge
         assert np.allclose(length[edges], radius * share.turn[edges, None], rtol=1e-12)
         place = {int(c): p for c, p in zip(torus.node_class, torus.mesh.points, strict=True)}
         for k in np.flatnonzero(at & ~share.is_edge).tolist():
-            offsets = place[int(share.key[k])] - torus.mesh.circles[:, :2]
+            offsets = place[int(share.key[k])] - torus.mesh.ellipses.circles[:, :2]
             offsets -= np.round(offsets)
             near = offsets[np.argmin(np.abs(np.hypot(*offsets.T) - radius))]
             assert share.normal[k, 0] @ near == pytest.approx(radius * length[k, 0], rel=0.02)

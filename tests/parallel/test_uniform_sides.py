@@ -1,5 +1,7 @@
 """Uniform displacements and tractions on the sides: direct solves, bounds of the periodic cell, closed forms, laws."""
 
+from dataclasses import replace
+
 import gmsh
 import numpy as np
 import pytest
@@ -116,6 +118,20 @@ def test_bonds_inside(comm, shared_path, boundary, bonds):
     result, (C, heat) = compute(case, comm), reference(comm, case)
     assert result.effective_stiffness == pytest.approx(C, rel=0, abs=1e-9 * np.abs(C).max())
     assert result.thermal_stress == pytest.approx(heat, rel=0, abs=1e-9 * np.abs(heat).max())
+
+
+def test_stresses_without_amplitudes_are_complete(comm, shared_path):
+    """The sides are pulled in a mean strain: rigid motions of the bodies take part in it."""
+    mesh = discs(comm, shared_path / "cell.msh", 2)
+    case = Case.parse(document(mesh, "traction", SPRINGS, decomposition={"subdomains": 14}))
+    with case_options(case.petsc):
+        cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
+    v, n = len(cell.solver.problem.loads), cell.solver.condensed.boundary.shape[1]
+    (state,) = cell.solver.solve_many(np.eye(n)[v : v + 1], np.zeros((cell.solver.rows, 1)))
+    expected, found = (cell.solver.stress_integral(s) for s in (state, replace(state, alpha=None)))
+    assert found == pytest.approx(expected, rel=0, abs=1e-10 * np.abs(expected).max())
+    assert np.abs(expected[v:]).max() > 1e-3
+    cell.destroy()
 
 
 @pytest.mark.parametrize("bonds", BONDS)

@@ -17,9 +17,9 @@ def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
     centres = mesh.points[mesh.triangles].mean(axis=1)
     kept = mesh.phase == 0
     if voids is not None:
-        away = centres[:, None] - mesh.circles[np.array(voids, int), :2]
+        away = centres[:, None] - mesh.ellipses.circles[np.array(voids, int), :2]
         away -= np.round(away / mesh.period) * mesh.period
-        kept = (np.hypot(*np.moveaxis(away, 2, 0)) > mesh.circles[np.array(voids, int), 2]).all(axis=1)
+        kept = (np.hypot(*np.moveaxis(away, 2, 0)) > mesh.ellipses.circles[np.array(voids, int), 2]).all(axis=1)
     write_part(path, mesh, kept)
 
 

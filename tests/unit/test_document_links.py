@@ -188,5 +188,5 @@ def test_the_recipe_for_a_mesh_is_the_file_and_is_read(tmp_path):
     mesh = msh_reader.read(tmp_path / "two_fibres.msh")
     assert mesh.phases == ("matrix", "fibre", "fibre:2")
     # A circle and an ellipse.
-    assert len(mesh.debonded_edges) and np.all(mesh.circles[0] == pytest.approx([1.5, 0.5, 0.3]))
+    assert len(mesh.debonded_edges) and np.all(mesh.ellipses.circles[0] == pytest.approx([1.5, 0.5, 0.3]))
     assert len(mesh.ellipses) == 2 and set(mesh.arc_circle) == {0, 1}

@@ -11,7 +11,7 @@ from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
-from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two, sequential
+from feti_homog.feti.linalg.sparse_direct import check_factor, power_of_two, sequential
 from feti_homog.feti.thresholds import BLOCK_ROWS, COLUMNS_AT_ONCE, COPIED_COLUMNS
 from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float, Int
@@ -31,10 +31,10 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
 
     Raises:
         LinAlgError: the block of the other rows is not positive definite, or the matrix is not finite.
-        MemoryError: the library cannot factor the matrix, usually for lack of memory.
+        MemoryError, FetiHomogError: the library lacks memory, or cannot factor the matrix for another reason.
     """
     if len(rows) == matrix.shape[0]:
-        return np.asarray(matrix.toarray(order="F"))
+        return np.asarray(matrix[rows][:, rows].toarray(order="F"))
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, keep_factor=False).S
     scale = power_of_two(matrix.diagonal())
@@ -59,7 +59,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
                 pc.getFactorMatrix().setMumpsIcntl(14, workspace)
             c_functions.set_schur(pc.getFactorMatrix(), index_set)
             pc.setUp()
-            if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL:
+            if pc.getFactorMatrix().getMumpsInfog(1) not in TOO_SMALL:
                 break
         check_factor(pc)
         schur = c_functions.schur_complement(pc.getFactorMatrix(), len(rows))

@@ -15,14 +15,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.feti.thresholds import MUMPS_EXTRA_WORKSPACE_PERCENT, ZERO_TOLERANCE
-from feti_homog.system.petsc import c_functions
+from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float
 
 Options = Mapping[str, bool | int | str]
-# INFOG(1) of MUMPS if a pivot is zero.
-SINGULAR = -10
+# INFOG(1) of MUMPS (see its users' guide) if a pivot is zero, and if memory or the allowed workspace is too small.
+SINGULAR, NO_MEMORY = {-6, -10, -40}, {-5, -7, -8, -9, -11, -12, -13, -14, -15, -17, -19, -20}
 # PETSc's error code if the library has no such factorization (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
 # End of PETSc's message if CHOLMOD is out of memory.
@@ -55,18 +55,22 @@ def check_factor(pc: PETSc.PC) -> None:
 
     Raises:
         LinAlgError: the matrix is singular or, with Cholesky, not positive definite, or MUMPS replaced tiny pivots.
-        MemoryError: MUMPS cannot factor, usually for lack of memory.
+        MemoryError: MUMPS lacks memory; FetiHomogError: MUMPS fails for another reason, usually its options.
     """
     library, is_cholesky = pc.getFactorSolverType(), pc.getType() == PETSc.PC.Type.CHOLESKY
     negative = 0
     if library == PETSc.Mat.SolverType.MUMPS:
         factor = pc.getFactorMatrix()
-        first, second = mumps_error(factor)
-        if first == SINGULAR:
-            raise np.linalg.LinAlgError(f"singular (MUMPS: INFOG(1) = {first}, INFOG(2) = {second})")
-        if first:
-            raise MemoryError(f"MUMPS cannot factor: INFOG(1) = {first}, INFOG(2) = {second}")
-        replaced = int(factor.getMumpsInfog(25))
+        first, second, replaced = (int(factor.getMumpsInfog(k)) for k in (1, 2, 25))
+        error = f"INFOG(1) = {first}, INFOG(2) = {second}"
+        if first in SINGULAR:
+            raise np.linalg.LinAlgError(f"singular (MUMPS: {error})")
+        if first in NO_MEMORY:
+            raise MemoryError(f"MUMPS: {error}")
+        if first < 0:
+            choices = options_database.choices(pc.getOptionsPrefix()).items()
+            options = ", ".join(f"-{name} {value}".strip() for name, value in choices) or "none"
+            raise FetiHomogError(f"MUMPS cannot factor a matrix: {error} (see its users' guide); options: {options}")
         if replaced:
             raise np.linalg.LinAlgError(f"nearly singular (MUMPS: INFOG(25) = {replaced} tiny pivots were replaced)")
         # For unsymmetric matrices INFOG(12) counts exchanged pivots.
@@ -76,12 +80,6 @@ def check_factor(pc: PETSc.PC) -> None:
         negative += zero
     if negative:
         raise np.linalg.LinAlgError(f"not positive definite ({library}: {negative} pivots are not positive)")
-
-
-def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
-    """Return MUMPS' error INFOG(1), INFOG(2), which PETSc may not report; (0, 0) without an error."""
-    first, second = (int(factor.getMumpsInfog(k)) for k in (1, 2))
-    return (first, second) if first < 0 else (0, 0)
 
 
 class DirectSolver:
@@ -153,8 +151,8 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
 
     Raises:
         LinAlgError: A is not positive definite, or nearly singular.
-        MemoryError: MUMPS cannot factor, or CHOLMOD is out of memory.
-        CaseError: the library in the options has no such factorization.
+        MemoryError: MUMPS or CHOLMOD is out of memory.
+        CaseError: the library in the options has no such factorization; FetiHomogError: as in `check_factor`.
     """
     A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(A.comm)
@@ -184,6 +182,8 @@ def factored(A: PETSc.Mat, prefix: str, library: str, is_ordered: bool = False) 
         try:
             ksp.setUp()
         except PETSc.Error as error:
+            if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
+                check_factor(pc)
             message = c_functions.error_words(error)
             if message.endswith(CHOLMOD_OUT_OF_MEMORY):
                 raise MemoryError(message) from error

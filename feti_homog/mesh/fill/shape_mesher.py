@@ -20,7 +20,7 @@ from feti_homog.mesh.readers.gmsh_file import MshContent, raw_mesh
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from feti_homog.microstructure import Arrangement, arrangements, phase_names
-from feti_homog.microstructure.shapes import convex_sums
+from feti_homog.microstructure.shapes import Ellipses, convex_sums
 from feti_homog.typing import Float
 
 # Distance / cell size up to which a curve lies on a side; core / semi-axis up to which a shape is an ellipse.
@@ -146,15 +146,15 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
-    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle that rounds corners or fits in an ellipse,
+    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle of curvature at corners and on ellipses,
     COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
     side that the outline faces; it is at least LEAST cell sizes.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)
     places, normal, shape = shapes.boundary(convex_sums.POINTS)
-    rounds = np.linalg.norm(shapes.frames, axis=1).min(axis=1)
-    rounds = np.where(rounds > 0, rounds, np.inf)
+    rounds, is_round = np.full(len(places), np.inf), shapes.frames.any(axis=(1, 2))[shape]
+    rounds[is_round] = Ellipses(shapes.centres, shapes.frames)[shape[is_round]].bend(normal[is_round])
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
     # The distance to the nearest point on another shape, or on an image.
     distance = np.full(len(places), np.inf)
@@ -165,7 +165,7 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
         image_points = (points + (arrangements.STEPS * size)[:, None]).reshape(-1, 2)
         distance[shape == label] = np.minimum(distance[shape == label], cKDTree(image_points).query(points)[0])
     length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
-    length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
+    length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness[shape]))
     for axis in (0, 1):
         to_side = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
         faces = np.abs(normal[:, axis]) > FACING

@@ -99,15 +99,15 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
     places = np.where(finite[:, None], middles.points, mesh.points[middles.edges].mean(axis=1))
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     start, stop = plane[middles.edges[:, 0]], plane[middles.edges[:, 1]]
-    off_side = np.zeros(len(start), bool)
+    bulge = np.zeros(len(start))
     for side in (plane.min(axis=0), plane.max(axis=0)):
         on_side = (np.abs(start - side) < reach) & (np.abs(stop - side) < reach)
-        off_side |= np.any(on_side & (np.abs(places[:, :2] - side) > reach), axis=1)
+        bulge = np.maximum(bulge, (on_side * np.abs(places[:, :2] - side)).max(axis=1))
     far = 2 * np.hypot(*(places[:, :2] - (start + stop) / 2).T) >= np.hypot(*(stop - start).T)
     kinds = {
         "coordinates are not finite": ~finite,
         "not in the plane": np.abs(places[:, 2] - mesh.points[0, 2]) > reach,
-        "off the straight side of the cell": off_side,
+        f"off the straight side of the cell, by up to {bulge.max():.2g}{_snap(bulge.max(), plane)}": bulge > reach,
         "farther from the middle than half the edge's length": far,
     }
     faults = []
@@ -167,15 +167,21 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
     missing = [at(corner + origin) for corner in bare]
-    advice = f"{_nearest(plane, bare, size[0])}; if a hole is there, shift the fibres until the corners lie in material"
+    advice = f"{_nearest(plane, bare, plane)}; if a hole is there, shift the fibres until the corners lie in material"
     return [f"no node at the corner {', '.join(missing)} of the cell{advice}"] if missing else []
 
 
-def _nearest(plane: Float, places: Float, width: float, close: float = 0.02) -> str:
-    """Name the distance of `places` (k, 2) from nodes `plane` (n, 2); propose to snap nodes within `close` widths."""
-    distance = float(cKDTree(plane).query(places)[0].max(initial=0.0))
-    snap = f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / width:.2g}'
-    return f"; the nearest nodes are up to {distance:.2g} away{snap if distance <= close * width else ''}"
+def _nearest(plane: Float, places: Float, free: Float) -> str:
+    """Name the distance of `places` (k, 2) from nodes `free` (m, 2) of `plane` (n, 2); propose to snap clear pairs."""
+    away, nearest = cKDTree(free).query(places)
+    distance, step = float(away.max(initial=0.0)), cKDTree(plane).query(free[nearest], 2)[0][:, 1].min(initial=np.inf)
+    is_clear = 2 * distance < step and len(np.unique(nearest)) == len(nearest)
+    return f"; the nearest nodes are up to {distance:.2g} away{_snap(distance, plane) if is_clear else ''}"
+
+
+def _snap(distance: float, plane: Float) -> str:
+    """Propose to move nodes `plane` (n, 2) by a distance onto sides and partners."""
+    return f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / np.ptp(plane[:, 0]):.2g}'
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:
@@ -207,23 +213,21 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
-        if len(nodes) < len(partners):  # the other side lists its nodes
-            continue
-        advice = f"; {len(partners)} nodes face {len(nodes)}: mesh both sides with {len(nodes)} (gmsh: Periodic Curve)"
-        advice *= len(nodes) > len(partners)
         along, other = plane[nodes, 1 - axis], np.sort(plane[partners, 1 - axis])
         after = np.clip(np.searchsorted(other, along), 1, len(other) - 1)
         gap = np.minimum(np.abs(other[after] - along), np.abs(other[after - 1] - along))
-        shift = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0)
-        before, single = f"not periodic, nodes of the {NO_PARTNER[axis, side]}", nodes[gap > SAME_PLACE * size.max()]
-        advice += _nearest(plane, plane[single] + shift[:2], size[0])
-        faults += _listed(
-            before, single, lambda k, s=shift: f"{mesh.node(k)}, expected at {at(mesh.points[k] + s)}", advice
-        )
+        shift, same = np.where(np.arange(3) == axis, (1 - 2 * side) * size[axis], 0.0), SAME_PLACE * size.max()
+        if len(nodes) < len(partners) or not (gap > same).any():  # the side with more nodes lists them
+            continue
+        advice = f"; {len(partners)} nodes face {len(nodes)}: mesh both sides with {len(nodes)} (gmsh: Periodic Curve)"
+        advice *= len(nodes) > len(partners)
+        places = plane[nodes] + shift[:2]
+        advice += _nearest(plane, places[gap > same], plane[cKDTree(places).query(plane)[0] > same])
+        expected = [f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}" for k in nodes[gap > same]]
+        faults += _listed(f"not periodic, nodes of the {NO_PARTNER[axis, side]}", expected, str, advice)
     # An element between bare sides would be its own neighbour.
     bare = [name for (axis, side), name in SIDES.items() if np.count_nonzero(plane[:, axis] == side * size[axis]) < 3]
-    lines = [f"no node between the corners of the {', '.join(bare)} side: expected one at least"]
-    return [*faults, *(lines if bare else [])]
+    return faults + [f"no node between the corners of the {', '.join(bare)} side: expected one at least"] * bool(bare)
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:

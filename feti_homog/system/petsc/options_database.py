@@ -25,8 +25,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
             cannot be made with the options.
     """
     database = PETSc.Options()
-    on_command_line = given_options()
-    options = {name.lower(): value for name, value in options.items()}
+    on_command_line, options = given_options(), {name.lower(): value for name, value in options.items()}
     options_of_run = {**options, **on_command_line}
     if faults := [*table.unknown_options(options), *values.faulty_values(options_of_run)]:
         raise CaseError(*faults)
@@ -142,6 +141,7 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
                 if prefix in table.MUMPS_PREFIXES:
                     pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
                 ksp.setFromOptions()
+                ksp.setErrorIfNotConverged(not is_krylov)  # MUMPS fails silently otherwise
                 ksp.setUp()
                 b.set(1.0)
                 ksp.solve(b, x)

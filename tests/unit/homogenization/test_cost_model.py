@@ -41,7 +41,9 @@ def test_more_unknowns_problems_and_columns_take_more_memory():
     assert memory(subdomains=(1,)) - base == pytest.approx(100_000 * partition_policy.FACTOR_BYTES)
 
 
-@pytest.mark.parametrize(("dofs", "bodies", "ranks"), [(1000, 9, 1), (400_000, 31, 8), (10_000_000, 31, 31)])
+@pytest.mark.parametrize(
+    ("dofs", "bodies", "ranks"), [(1000, 9, 1), (99_999, 9, 1), (400_000, 31, 8), (10_000_000, 31, 31)]
+)
 def test_suggested_ranks_grow_with_the_size_up_to_the_bodies(dofs, bodies, ranks):
     assert partition_policy.recommended_ranks(dofs, bodies) == ranks
 

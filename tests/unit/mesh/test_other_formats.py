@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.other_formats import written
-from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, grid, node, turned
+from unit.mesh.faulty_meshes import MATRIX, RIGHT_SIDE, MshFile, grid, node, turned
 from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
@@ -24,7 +24,8 @@ def test_every_format_gives_the_same_mesh(suffix, mesh, tmp_path):
     result = read(written(mesh, tmp_path / f"one{suffix}"))
     assert result.phases == expected.phases and np.array_equal(result.points, expected.points)
     assert np.array_equal(_sorted(result), _sorted(expected))
-    assert result.circles == pytest.approx(expected.circles) and len(result.circles) == (mesh is BENT)
+    assert result.ellipses.circles == pytest.approx(expected.ellipses.circles)
+    assert len(result.ellipses) == (mesh is BENT)
     assert np.array_equal(np.sort(result.arc_edges), np.sort(expected.arc_edges))
 
 
@@ -36,7 +37,7 @@ def test_clockwise_elements_among_others_are_turned(suffix, mesh, tmp_path):
     assert np.array_equal(_sorted(result), _sorted(expected)) and np.array_equal(result.points, expected.points)
     assert areas(result.points, result.triangles) == pytest.approx(areas(expected.points, expected.triangles))
     assert np.array_equal(np.sort(result.arc_edges), np.sort(expected.arc_edges))
-    assert result.circles == pytest.approx(expected.circles)
+    assert result.ellipses.circles == pytest.approx(expected.ellipses.circles)
 
 
 @pytest.mark.parametrize("mesh", [grid(), second_order(grid())], ids=["first", "second"])
@@ -88,15 +89,35 @@ def test_what_is_farther_than_the_tolerance_is_reported(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("places", "away"), [((1.0, 0.5003), 3e-4), ((0.9997, 0.5), 3e-4), ((1.0003, 0.5), 3e-4), ((1.0, 0.53), 0.03)]
+    ("places", "away"),
+    [((1.0, 0.5003), 3e-4), ((0.9997, 0.5), 3e-4), ((1.0003, 0.5), 3e-4), ((1.0, 0.58), 0.08), ((1.0, 0.63), 0.13)],
 )
 def test_sides_that_nearly_match_name_the_distance_and_the_tolerance_that_snaps_them(places, away, tmp_path):
     path = written(grid().moved(**{f"n{node(4, 2)}": places}), tmp_path / "rough.msh")
     with pytest.raises(MeshError, match=f"; the nearest nodes are up to {away:g} away") as error:
         read(path)
     tolerances = re.findall('repair = "snap" in .cell. moves them, with snap_tolerance = ([0-9.e-]+)', str(error.value))
-    assert (len(tolerances) > 0) == (away < 0.02)
+    assert (len(tolerances) > 0) == (away < 0.1)  # of edges of 0.25 a node may move by less than half of one
     assert all(away / 2 < read(path, snap=float(word)).snapped * (1 + 1e-9) <= 1.01 * away for word in tolerances)
+
+
+def test_more_nodes_on_one_side_than_on_the_other_cannot_be_snapped(tmp_path):
+    mesh, (a, b, c) = grid(), grid().elements[23][3]
+    mesh = replace(mesh, nodes={**mesh.nodes, 99: (1.0, 0.51, 0.0)})
+    mesh = mesh.without(23).with_element(101, 2, MATRIX, (a, b, 99)).with_element(102, 2, MATRIX, (a, 99, c))
+    path = written(mesh, tmp_path / "more.msh")
+    with pytest.raises(MeshError, match=r"5 nodes face 6: .*; the nearest nodes are up to [0-9.]+ away$"):
+        read(path)
+
+
+def test_middle_nodes_off_the_sides_name_the_largest_distance_and_the_cure(tmp_path):
+    away = {(0.375, 0.0): (0.375, 0.01), (0.125, 0.0): (0.125, 0.02), (0.625, 0.0): (0.625, 1e-9)}
+    path = written(second_order(grid(), lambda x, y: away.get((x, y), (x, y))), tmp_path / "off.msh")
+    cure = 'repair = "snap" in .cell. moves them, with snap_tolerance = 0.022$'
+    with pytest.raises(MeshError, match=f"off the straight side of the cell, by up to 0.02: {cure}") as error:
+        read(path)
+    assert str(error.value).count("middle node") == 2
+    assert read(path, snap=0.022).points == pytest.approx(read(written(grid(), tmp_path / "good.msh")).points)
 
 
 def test_a_mesh_that_matches_is_not_moved(tmp_path):

@@ -17,7 +17,7 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
-from feti_homog.mesh.outline.graded_size import MeshSizes
+from feti_homog.mesh.outline.graded_size import MIN_EDGES_AROUND, MeshSizes
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.microstructure.arrangements import Arrangement
 from feti_homog.microstructure.shapes.convex_sums import ConvexSums
@@ -100,6 +100,20 @@ def test_polygons_circles_and_ellipses_are_meshed_together():
     torus = Torus.of(mesh)
     assert len(torus.constituent_phase) == 5
     assert least_angle(mesh.points, mesh.triangles).min() > 15
+
+
+@pytest.mark.parametrize("ratio", [2.0, 5.0, 10.0])
+def test_edges_on_slender_ellipses_beside_polygons_follow_their_curvature(ratio):
+    """At the tips the radius of curvature is b^2 / a, in the middle a^2 / b."""
+    oval, hexagon = {"x": 0.5, "y": 0.5, "a": 0.35, "b": 0.35 / ratio, "angle": 20.0}, {"radius": 0.03, "sides": 6}
+    mesh = generate(case_of(oval, {"x": 0.15, "y": 0.85} | hexagon, mesh_size=0.1).cell)
+    curves = mesh.ellipses[mesh.arc_circle]
+    ends = [curves.parameter(mesh.points[mesh.arc_edges[:, k]] - curves.centres) for k in (0, 1)]
+    start, stop = (curves.normal(angle) for angle in ends)
+    turn = np.arccos(np.clip((start * stop).sum(axis=1), -1.0, 1.0))
+    assert turn.sum() == pytest.approx(2 * np.pi)
+    assert turn.max() < 1.6 * 2 * np.pi / MIN_EDGES_AROUND
+    assert 8 < len(turn) < 60
 
 
 @pytest.mark.parametrize("gap", [0.02, 0.005])

@@ -26,7 +26,7 @@ def test_round_fibre_is_that_of_the_same_mesh_of_first_order(centre, tmp_path):
         polar_cell(centre, 0.35, tmp_path / f"{order}.msh", order=order)
     first, second = (read(tmp_path / f"{order}.msh") for order in (1, 2))
     assert len(second.arc_edges) == len(first.arc_edges) > 0
-    assert second.circles == pytest.approx(first.circles, abs=1e-8)
+    assert second.ellipses.circles == pytest.approx(first.ellipses.circles, abs=1e-8)
     assert len(second.points) == len(first.points) and len(second.triangles) == len(first.triangles)
 
 
@@ -37,22 +37,22 @@ def test_quadrilaterals_of_second_order_are_round_fibres(nodes, suffix, tmp_path
     options = {"RecombineAll": 1, "SecondOrderIncomplete": int(nodes == 8), "SaveGroupsOfElements": 1}
     polar_cell((0.5, 0.5), 0.3, path, order=2, size=0.2, **options)
     mesh = read(path, phases={"matrix": (1,), "fibre": (2,)} if suffix == ".vtk" else {})
-    assert mesh.circles == pytest.approx(np.array([[0.5, 0.5, 0.3]]), abs=1e-8)
+    assert mesh.ellipses.circles == pytest.approx(np.array([[0.5, 0.5, 0.3]]), abs=1e-8)
     assert fibre_area(mesh, 2, 2) == pytest.approx(np.pi * 0.09, rel=1e-3)
 
 
 def test_few_edges_are_a_circle_if_their_middle_nodes_are_on_it(tmp_path):
     polar_cell((0.5, 0.5), 0.1, tmp_path / "round.msh", order=2, size=0.2)
     mesh = read(tmp_path / "round.msh")
-    assert len(mesh.arc_edges) < 8 and mesh.circles == pytest.approx(np.array([[0.5, 0.5, 0.1]]), abs=1e-8)
+    assert len(mesh.arc_edges) < 8 and mesh.ellipses.circles == pytest.approx(np.array([[0.5, 0.5, 0.1]]), abs=1e-8)
 
 
 def test_straight_edges_stay_straight(tmp_path):
     """Corners on a circle are no circle if by the middle nodes the sides are straight."""
     ring = [(2 + 2**0.5, 2), (3, 3), (2, 2 + 2**0.5), (1, 3), (2 - 2**0.5, 2), (1, 1), (2, 2 - 2**0.5), (3, 1)]
     mesh = grid().moved(**{f"n{node(round(x), round(y))}": (x / 4, y / 4) for x, y in ring})
-    assert len(read(_written(mesh, tmp_path)).circles) == 1
-    assert len(read(_written(second_order(mesh), tmp_path)).circles) == 0
+    assert len(read(_written(mesh, tmp_path)).ellipses) == 1
+    assert len(read(_written(second_order(mesh), tmp_path)).ellipses) == 0
 
 
 def test_bent_edges_go_through_their_middle_nodes(tmp_path):
@@ -60,7 +60,7 @@ def test_bent_edges_go_through_their_middle_nodes(tmp_path):
     middles = {(0.75, 0.375): (0.77, 0.37), (0.75, 0.625): (0.76, 0.63)}
     mesh = read(_written(second_order(grid(), lambda x, y: middles.get((x, y), (x, y))), tmp_path))
     assert len(mesh.arc_edges) == 2 and np.isnan(fibre_circles(Torus.of(mesh))[1, 2])
-    for edge, circle in zip(mesh.arc_edges, mesh.circles, strict=True):
+    for edge, circle in zip(mesh.arc_edges, mesh.ellipses.circles, strict=True):
         ends = mesh.points[edge]
         on_arc = np.array([*ends, middles[tuple(ends.mean(axis=0).tolist())]])
         assert np.linalg.norm(on_arc - circle[:2], axis=1) == pytest.approx(np.full(3, circle[2]), rel=1e-12)

@@ -46,7 +46,7 @@ def test_a_hole_is_a_fault_unless_the_case_has_voids(tmp_path):
 
 
 def test_a_part_that_a_void_surrounds_is_held_by_nothing(mesh, tmp_path):
-    away = np.linalg.norm(mesh.points[mesh.triangles].mean(axis=1) - 0.5, axis=1) / mesh.circles[0, 2]
+    away = np.linalg.norm(mesh.points[mesh.triangles].mean(axis=1) - 0.5, axis=1) / mesh.ellipses.circles[0, 2]
     write_part(tmp_path / "cell.msh", mesh, without(mesh, (mesh.phase == 1) & (away > 0.5)))
     (fault,) = faults_of(tmp_path / "cell.msh")
     assert fault.startswith("cell.msh: floating parts, separated from all others by voids: the part with element ")

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix, diags, identity, kron
+from scipy.sparse import block_diag, csr_matrix, diags, identity, kron
 
+from feti_homog.errors import FetiHomogError
 from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, schur_complement
 
 
@@ -27,6 +28,13 @@ def test_it_is_that_of_dense_algebra(rows, order):
     D = A.toarray()
     expected = D[np.ix_(rows, rows)] - D[np.ix_(rows, rest)] @ np.linalg.solve(D[np.ix_(rest, rest)], D[rest][:, rows])
     np.testing.assert_allclose(schur_complement(A, rows, order), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [np.array([30, 2, 17, 9]), shuffled(36)], ids=["some", "all"])
+def test_rows_keep_their_order(rows):
+    A, place = laplacian(6), np.argsort(rows)
+    in_order = schur_complement(A, rows[place])
+    np.testing.assert_allclose(schur_complement(A, rows)[np.ix_(place, place)], in_order, atol=1e-12)
 
 
 def test_a_singular_matrix_has_one():
@@ -71,12 +79,24 @@ def test_a_kept_factor_has_displacements_of_a_singular_matrix():
         assert (found[rows] == u[rows][:, columns]).all() and (forces[:, columns] == before).all()
 
 
-def test_a_failure_of_mumps_is_reported():
-    """MUMPS may use one megabyte."""
+@pytest.mark.parametrize(
+    ("option", "value", "error", "words"),
+    [
+        ("mat_mumps_icntl_23", 1, MemoryError, r"MUMPS: INFOG\(1\) = -"),  # one megabyte
+        ("mat_mumps_icntl_8", -1, FetiHomogError, "options: -feti_schur_mat_mumps_icntl_8 -1$"),  # no such scaling
+    ],
+)
+def test_a_failure_of_mumps_names_its_cause(option, value, error, words):
     options = PETSc.Options("feti_schur_")
-    options.setValue("mat_mumps_icntl_23", 1)
+    options.setValue(option, value)
     try:
-        with pytest.raises(MemoryError, match=r"MUMPS cannot factor: INFOG\(1\) = -"):
+        with pytest.raises(error, match=words):
             schur_complement(laplacian(60), np.arange(60))
     finally:
-        options.delValue("mat_mumps_icntl_23")
+        options.delValue(option)
+
+
+def test_a_singular_rest_is_no_lack_of_memory():
+    A = csr_matrix(block_diag([laplacian(4), np.zeros((2, 2))]))
+    with pytest.raises(np.linalg.LinAlgError, match="singular"):
+        schur_complement(A, np.arange(3))

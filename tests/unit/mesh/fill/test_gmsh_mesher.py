@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import replace
 from functools import cache
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -41,13 +42,14 @@ named = pytest.mark.parametrize("name", CELLS)
 def test_cells_of_all_sizes_have_one_mesh(geometry):
     unit, small = (generate(cell(geometry, spread=0.3, **width)) for width in ({}, {"width": 2e-4}))
     assert np.array_equal(small.triangles, unit.triangles) and np.array_equal(small.arc_edges, unit.arc_edges)
-    for name in ("points", "circles", "period"):
-        assert getattr(small, name) == pytest.approx(2e-4 * getattr(unit, name), rel=1e-14)
+    for name in ("points", "ellipses.circles", "period"):
+        one, other = map(attrgetter(name), (small, unit))
+        assert one == pytest.approx(2e-4 * other, rel=1e-14)
     assert (small.width, small.height) == pytest.approx((2e-4, 2e-4 * unit.height))
     of_radius = generate(cell(geometry, spread=0.3, fibre_radius=5e-6))
-    radii = np.unique(of_radius.circles[:, 2])
+    radii = np.unique(of_radius.ellipses.circles[:, 2])
     assert radii.min() <= 5e-6 * (1 + 1e-12) and radii.max() >= 5e-6 * (1 - 1e-12)
-    assert of_radius.circles == pytest.approx(unit.circles * of_radius.width, rel=1e-12)
+    assert of_radius.ellipses.circles == pytest.approx(unit.ellipses.circles * of_radius.width, rel=1e-12)
 
 
 @cache
@@ -79,7 +81,7 @@ def test_triangles_fill_the_cell(name):
 @named
 def test_fibre_area_is_that_of_the_inscribed_polygons(name):
     mesh = mesh_of(name)
-    radius = mesh.circles[mesh.arc_circle, 2]
+    radius = mesh.ellipses.circles[mesh.arc_circle, 2]
     chord = np.linalg.norm(np.diff(mesh.points[mesh.arc_edges], axis=1)[:, 0], axis=1)
     turn = 2 * np.arcsin(chord / (2 * radius))
     missing = np.sum(radius**2 / 2 * (turn - np.sin(turn)))
@@ -114,8 +116,8 @@ def test_euler_characteristic_of_the_torus_is_zero(name):
 @named
 def test_arcs_are_the_interface_and_lie_on_circles(name):
     mesh = mesh_of(name)
-    spokes = mesh.points[mesh.arc_edges] - mesh.circles[mesh.arc_circle][:, None, :2]
-    radius = mesh.circles[mesh.arc_circle, 2][:, None]
+    spokes = mesh.points[mesh.arc_edges] - mesh.ellipses.circles[mesh.arc_circle][:, None, :2]
+    radius = mesh.ellipses.circles[mesh.arc_circle, 2][:, None]
     assert np.abs(np.linalg.norm(spokes, axis=2) / radius - 1).max() < 1e-12
     phases = {}
     for triangle, phase in zip(mesh.triangles.tolist(), mesh.phase.tolist(), strict=True):
@@ -149,9 +151,9 @@ def test_arcs_stay_clear_of_the_next_fibre(name):
     """The sagitta of an edge is small against the way from its middle to any other circle."""
     mesh = mesh_of(name)
     middle = mesh.points[mesh.arc_edges].mean(axis=1)
-    radius = mesh.circles[mesh.arc_circle, 2]
+    radius = mesh.ellipses.circles[mesh.arc_circle, 2]
     chord = np.linalg.norm(np.diff(mesh.points[mesh.arc_edges], axis=1)[:, 0], axis=1)
-    away = np.linalg.norm(middle[:, None] - mesh.circles[:, :2], axis=2) - mesh.circles[:, 2]
+    away = np.linalg.norm(middle[:, None] - mesh.ellipses.circles[:, :2], axis=2) - mesh.ellipses.circles[:, 2]
     away[np.arange(len(away)), mesh.arc_circle] = np.inf
     assert np.all(chord**2 / (8 * radius) < 0.3 * away.min(axis=1))
 

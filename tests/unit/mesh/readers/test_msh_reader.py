@@ -51,7 +51,7 @@ def test_grid_comes_back(tmp_path):
     grid().write(tmp_path / "good.msh")
     mesh = read(tmp_path / "good.msh")
     assert (mesh.width, mesh.height, mesh.phases) == (1.0, 1.0, ("matrix", "fibre"))
-    assert len(mesh.points) == 25 and len(mesh.triangles) == 32 and len(mesh.circles) == 0
+    assert len(mesh.points) == 25 and len(mesh.triangles) == 32 and len(mesh.ellipses) == 0
     assert areas(mesh.points, mesh.triangles) == pytest.approx(np.full(32, 1 / 32))
     assert np.bincount(mesh.phase).tolist() == [24, 8]
     assert len(np.unique(mesh.representative)) == 16
@@ -85,7 +85,7 @@ def test_phases_beyond_two_and_matrix_first(tmp_path):
     mesh = replace(mesh, names={1: "fibre:glass", 2: "matrix"})
     mesh.write(tmp_path / "good.msh")
     result = read(tmp_path / "good.msh")
-    assert result.phases == ("matrix", "fibre:glass") and len(result.circles) == 0
+    assert result.phases == ("matrix", "fibre:glass") and len(result.ellipses) == 0
     upper = result.points[result.triangles].mean(axis=1)[:, 1] > 0.5
     assert np.array_equal(result.phase, np.where(upper, 0, 1))
 
@@ -96,7 +96,7 @@ def test_polygons_stay_polygons(corner, tmp_path):
     inside = (lambda x, y: abs(x - 0.5) > 0.25 and abs(y - 0.5) > 0.25) if corner else None
     (grid(inside) if inside else grid()).write(tmp_path / "good.msh")
     mesh = read(tmp_path / "good.msh")
-    assert len(mesh.circles) == 0 and len(mesh.arc_edges) == 0 and np.bincount(mesh.phase)[1] == 8
+    assert len(mesh.ellipses) == 0 and len(mesh.arc_edges) == 0 and np.bincount(mesh.phase)[1] == 8
 
 
 @pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.1, 0.45), (0.93, 0.08)])
@@ -105,10 +105,10 @@ def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
     mesh = read(tmp_path / "round.msh")
     _assert_periodic(mesh)
     size = np.array([mesh.width, mesh.height])
-    offset = (mesh.circles[:, :2] - centre + size / 2) % size - size / 2
-    assert np.abs(offset).max() < 1e-8 and mesh.circles[:, 2] == pytest.approx(0.35, abs=1e-8)
-    spokes = mesh.points[mesh.arc_edges] - mesh.circles[mesh.arc_circle][:, None, :2]
-    radius = mesh.circles[mesh.arc_circle][:, None, 2]
+    offset = (mesh.ellipses.circles[:, :2] - centre + size / 2) % size - size / 2
+    assert np.abs(offset).max() < 1e-8 and mesh.ellipses.circles[:, 2] == pytest.approx(0.35, abs=1e-8)
+    spokes = mesh.points[mesh.arc_edges] - mesh.ellipses.circles[mesh.arc_circle][:, None, :2]
+    radius = mesh.ellipses.circles[mesh.arc_circle][:, None, 2]
     assert np.abs(np.linalg.norm(spokes, axis=2) / radius - 1).max() < 1e-12
     turned = np.arctan2(*np.moveaxis(spokes, 2, 0)[::-1])
     spans = np.abs((turned[:, 1] - turned[:, 0] + np.pi) % (2 * np.pi) - np.pi)
@@ -118,7 +118,7 @@ def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
 def test_an_ellipse_is_no_circle(tmp_path):
     polar_cell((0.5, 0.5), 0.35, tmp_path / "round.msh", stretch=1 + 1e-5)
     mesh = read(tmp_path / "round.msh")
-    assert len(mesh.ellipses) == 1 and np.isnan(mesh.circles[0, 2])
+    assert len(mesh.ellipses) == 1 and np.isnan(mesh.ellipses.circles[0, 2])
     semi_axes = np.linalg.svd(mesh.ellipses.frames[0], compute_uv=False)
     assert semi_axes == pytest.approx([0.35 * (1 + 1e-5), 0.35], rel=1e-9)
 
@@ -126,10 +126,10 @@ def test_an_ellipse_is_no_circle(tmp_path):
 @pytest.mark.parametrize(("name", "height", "circles"), [("square", 1.0, 1), ("hexagonal", np.sqrt(3), 5)])
 def test_meshes_of_the_repository_have_their_circles_and_fraction(name, height, circles):
     mesh = read(MESHES / f"{name}.msh")
-    assert (mesh.width, mesh.height) == pytest.approx((1.0, height)) and len(mesh.circles) == circles
+    assert (mesh.width, mesh.height) == pytest.approx((1.0, height)) and len(mesh.ellipses) == circles
     _assert_periodic(mesh)
     fibres = 1 if name == "square" else 2
-    assert fibres * np.pi * mesh.circles[0, 2] ** 2 / height == pytest.approx(0.4, abs=1e-6)
+    assert fibres * np.pi * mesh.ellipses.circles[0, 2] ** 2 / height == pytest.approx(0.4, abs=1e-6)
 
 
 def _faults(mesh: MshFile, folder: Path) -> tuple[str, ...]:

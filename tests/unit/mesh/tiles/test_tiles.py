@@ -52,7 +52,7 @@ def test_tiles_have_the_areas_and_circles_of_the_cell_at_once(name):
         own, other = (areas(m.points, m.triangles)[m.phase == of_phase].sum() for m in (mesh, whole))
         # Arcs have other edges where bridges end.
         assert own == pytest.approx(other, rel=1e-2)
-    assert np.array_equal(mesh.circles, whole.circles)
+    assert np.array_equal(mesh.ellipses.circles, whole.ellipses.circles)
     assert 0.9 < len(mesh.triangles) / len(whole.triangles) < 1.6
     angles = [np.quantile(least_angle(m.points, m.triangles), [0.0, 0.01]) for m in (mesh, whole)]
     assert np.all(angles[0] > angles[1] - 4)

@@ -1,0 +1,50 @@
+"""An arc on a fibre that holds otherwise, beside fibres that debond: every pair of phases has the same law."""
+
+import pytest
+from mpi4py import MPI
+
+from feti_homog import Case, CaseError, run
+
+GLASS = {
+    "between": ["glass", "matrix"],
+    "law": "bilinear",
+    "normal_stiffness": 2e6,
+    "tangential_stiffness": 2e6,
+    "normal_strength": 50.0,
+    "tangential_strength": 50.0,
+    "normal_toughness": 0.001,
+    "tangential_toughness": 0.001,
+    "teeth": 1,
+}
+ARC = {"between": ["carbon", "matrix"], "debonded": [{"fibre": 1, "angle": 90.0}]}
+FIBRES = [
+    {"x": 0.3, "y": 0.3, "radius": 0.18, "phase": "carbon"},
+    {"x": 0.72, "y": 0.7, "radius": 0.18, "phase": "glass"},
+]
+
+
+def case_of(carbon):
+    """Return the path of a cell with two fibres, by the interface of the carbon fibre."""
+    moduli = {"matrix": (3500.0, 0.35), "carbon": (15000.0, 0.25), "glass": (74000.0, 0.2)}
+    return Case.parse({
+        "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.15, "fibre_list": FIBRES},
+        "material": {name: {"young": E, "poisson": nu} for name, (E, nu) in moduli.items()},
+        "analysis": {"type": "path", "plane": "strain"},
+        "path": {"strain": [0.02, 0.0, 0.0]},
+        "interface": [GLASS, carbon],
+        "output": {"pictures": False, "mesh_error": False},
+    })  # fmt: skip
+
+
+def test_a_pair_without_the_law_is_told_how_its_bonds_hold():
+    words = "normal_strength: missing; .*; bonds that hold have 100 times the strengths and 1e4 times the toughnesses"
+    with pytest.raises(CaseError, match=words):
+        case_of(ARC | {"law": "bilinear"})
+
+
+def test_such_bonds_hold_beside_an_arc():
+    strengths = dict.fromkeys(("normal_strength", "tangential_strength"), 100.0 * GLASS["normal_strength"])
+    toughnesses = dict.fromkeys(("normal_toughness", "tangential_toughness"), 1e4 * GLASS["normal_toughness"])
+    result = run(case_of(GLASS | strengths | toughnesses | ARC), MPI.COMM_SELF)
+    shares = [point.debonded_shares for point in result.path]
+    assert shares[-1][0] > 0.3 and all(share[1] == shares[0][1] > 0.1 for share in shares)
