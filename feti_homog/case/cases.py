@@ -146,7 +146,7 @@ class Case:
         least = min(float(laws.stiffness_of(m, self.analysis.plane).max()) for m in self.materials.values())
         tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in self.interfaces]
         tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
-        units = [f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are the units alike?"
+        units = [f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are both in one unit?"
                  for section, table, end in tables for name, value in vars(table).items()
                  if name.endswith(end) and least < (value or 0.0) < float("inf")]  # fmt: skip
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))

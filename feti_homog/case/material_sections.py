@@ -152,7 +152,7 @@ def unlike_moduli(materials: Mapping[str, material_forms.Material]) -> list[str]
     moduli = {k: max(float(np.max(vars(m).get(name) or 0.0)) for name in names) for k, m in materials.items()}
     matrix = moduli.pop(phase_names.MATRIX, 0.0)
     return [
-        f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are the units alike?"
+        f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are both in one unit?"
         for phase, value in moduli.items()
         if phase != phase_names.COATING and value * matrix and not matrix <= value <= 1e3 * matrix
     ]

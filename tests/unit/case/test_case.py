@@ -228,7 +228,7 @@ def test_strengths_above_a_stiffness_are_warned_of():
         "interface": {"normal_strength": 60.0, "tangential_strength": 3.1},
     }
     asked["material"]["fibre"]["strength"] = {"principal": 3.3}
-    end = "above 3.2, the stiffness of a phase: are the units alike?"
+    end = "above 3.2, the stiffness of a phase: are both in one unit?"
     expected = (f"[interface] normal_strength = 60: {end}", f"[material.fibre.strength] principal = 3.3: {end}")
     assert parse(asked, Path()).warnings() == expected
 
@@ -239,7 +239,7 @@ def test_strengths_above_a_stiffness_are_warned_of():
 )
 def test_moduli_in_unlike_units_are_remarked(tmp_path, matrix, young, is_alike):
     remarks = case_of(tmp_path, changed(("88.0", str(matrix)), ("200.0", str(young)))).remarks()
-    line = f"[material.fibre] modulus {young:g}, [material.matrix] {matrix:g}: are the units alike?"
+    line = f"[material.fibre] modulus {young:g}, [material.matrix] {matrix:g}: are both in one unit?"
     assert remarks == (() if is_alike else (line,))
     assert case_of(tmp_path, fibre(TRANSVERSE + AXIAL)).remarks() == ()  # only across the fibres it is softer
 
