@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from support.sample_output import Sample, in_space, sample
+from support.sample_output import in_space, sample, write
 
 from feti_homog.report.plots import deformed_panels, plot_helpers
 from feti_homog.report.plots.decimation import (
@@ -18,16 +18,6 @@ from feti_homog.report.plots.decimation import (
     largest_scale,
     node_means,
 )
-from feti_homog.results.field_file import FieldFile
-
-
-def write(directory: Path, whole: Sample) -> Path:
-    from mpi4py import MPI
-
-    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
-        for k, state in enumerate(whole.states):
-            file.write_state(k, state)
-    return directory / "result.h5"
 
 
 def square() -> DrawnMesh:

@@ -5,8 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from support.sample_output import in_space, sample
-from unit.report.plots.test_figures import write
+from support.sample_output import in_space, sample, write
 
 from feti_homog.report.plots import plot_helpers
 from feti_homog.report.plots.drawn_cell import DrawnCell
