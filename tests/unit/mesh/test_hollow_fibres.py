@@ -4,11 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tomli_w
 from support.generated_meshes import generate
 
 from feti_homog.case import cases
-from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.mesh_fibres import fibre_circles
@@ -40,21 +38,6 @@ def test_a_hollow_fibre_is_a_ring_around_a_void(more):
     torus = Torus.of(mesh)
     tube = np.unique(torus.constituent[own])
     assert len(tube) == 1 and fibre_circles(torus)[tube[0], 2] == pytest.approx(0.2)
-
-
-@pytest.mark.parametrize("more", [(), (OVAL,)], ids=["circles", "ellipses"])
-def test_the_table_of_hollow_fibres_gives_the_cell_again(tmp_path, more):
-    case = case_of(TUBE, COATED, VOID, *more, coated=True)
-    document = {k: v for k, v in case.resolved().items() if k in ("cell", "material", "analysis")}
-    (tmp_path / "case.toml").write_text(tomli_w.dumps(document))
-    (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
-    document["cell"] = {"geometry": "table", "file": "again.csv", "mesh_size": 0.03}
-    again = generate(cases.parse(document, tmp_path).cell)
-    mesh = generate(case.cell)
-    for phase in range(3):
-        one, other = (areas(m.points, m.triangles)[m.phase == phase].sum() for m in (mesh, again))
-        assert one == pytest.approx(other, rel=1e-3)
-    assert Torus.of(again).voids == 2
 
 
 @pytest.mark.parametrize(("row", "words"), [

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import gmsh
 import numpy as np
 import pytest
 from support.users_meshes import polar_cell
@@ -36,15 +35,6 @@ def test_faults_after_the_first_few_are_counted(tmp_path):
         mesh = mesh.with_element(tag, 2, 0, mesh.elements[tag][3])
     (fault,) = _faults(mesh, tmp_path)
     assert fault.endswith("element 5 at (0.666666667, 0.0833333333) and 2 more: not in any physical surface")
-
-
-@pytest.mark.parametrize(("version", "binary"), [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)])
-def test_every_format_gives_the_same_mesh(version, binary, tmp_path):
-    grid().write(tmp_path / "good.msh")
-    reference = read(tmp_path / "good.msh")
-    _rewritten(tmp_path / "good.msh", tmp_path / "other.msh", version, binary)
-    mesh = read(tmp_path / "other.msh")
-    assert np.array_equal(_content(mesh), _content(reference)) and mesh.phases == reference.phases
 
 
 def test_grid_comes_back(tmp_path):
@@ -137,25 +127,6 @@ def _faults(mesh: MshFile, folder: Path) -> tuple[str, ...]:
     with pytest.raises(MeshError) as caught:
         read(folder / "faulty.msh")
     return caught.value.faults
-
-
-def _rewritten(source: Path, target: Path, version: float, binary: int) -> None:
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(source))
-        gmsh.option.setNumber("Mesh.MshFileVersion", version)
-        gmsh.option.setNumber("Mesh.Binary", binary)
-        gmsh.write(str(target))
-    finally:
-        gmsh.finalize()
-
-
-def _content(mesh: CoarseMesh) -> np.ndarray:
-    """Return the triangles (m, 7) by their corners' coordinates and phase, sorted, whatever the numbering."""
-    corners = np.sort(mesh.points[mesh.triangles].view(complex)[..., 0], axis=1)
-    rows = np.column_stack([corners.real, corners.imag, mesh.phase])
-    return rows[np.lexsort(rows.T)]
 
 
 def _assert_periodic(mesh: CoarseMesh) -> None:
