@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.users_meshes import polar_cell
-from unit.mesh.faulty_meshes import FAULTY_MESHES, MshFile, grid, write_faulty
+from unit.mesh.faulty_meshes import FAULTY_MESHES, grid, write_faulty
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas
@@ -26,14 +26,14 @@ def test_faulty_mesh_is_refused(message, mesh, tmp_path):
 
 def test_several_faults_are_reported_at_once(tmp_path):
     mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
-    assert len(_faults(mesh, tmp_path)) == 4
+    assert len(mesh.faults(tmp_path)) == 4
 
 
 def test_faults_after_the_first_few_are_counted(tmp_path):
     mesh = grid()
     for tag in (1, 3, 5, 7, 9):
         mesh = mesh.with_element(tag, 2, 0, mesh.elements[tag][3])
-    (fault,) = _faults(mesh, tmp_path)
+    (fault,) = mesh.faults(tmp_path)
     assert fault.endswith("element 5 at (0.666666667, 0.0833333333) and 2 more: not in any physical surface")
 
 
@@ -120,13 +120,6 @@ def test_meshes_of_the_repository_have_their_circles_and_fraction(name, height, 
     _assert_periodic(mesh)
     fibres = 1 if name == "square" else 2
     assert fibres * np.pi * mesh.circles[0, 2] ** 2 / height == pytest.approx(0.4, abs=1e-6)
-
-
-def _faults(mesh: MshFile, folder: Path) -> tuple[str, ...]:
-    mesh.write(folder / "faulty.msh")
-    with pytest.raises(MeshError) as caught:
-        read(folder / "faulty.msh")
-    return caught.value.faults
 
 
 def _assert_periodic(mesh: CoarseMesh) -> None:
