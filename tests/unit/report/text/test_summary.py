@@ -92,12 +92,6 @@ def test_checks_beyond_the_tolerance_fail() -> None:
     assert line(summary(document), "jump").split() == ["jump", "3.0e-06"]
 
 
-def test_a_value_out_of_its_bounds_is_marked() -> None:
-    assert "outside" not in summary(DOCUMENT)
-    stiffness = [[170.0, 0.0, 0.0], [0.0, 150.0, 0.0], [0.0, 0.0, 45.0]]
-    assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
-
-
 def test_remarks_warnings_and_faults_are_reported_in_this_order() -> None:
     text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
     assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
