@@ -168,5 +168,3 @@ RUBBING_HEATS = {
     0.42: Reference((5.86e-4, 0.05032, 0.13484, 0.21641), 2e-3, RUBBING_PROTOTYPE),
     0.21: Reference((5.75e-4, 0.05024, 0.13456, 0.21588), 6e-4, RUBBING_PROTOTYPE),
 }
-# friction: s / q and degrees of the first slip of a debonded fibre in a medium under -q + s, -q - s.
-FIRST_SLIP = {0.25: Reference((0.20398428, 37.98), 5e-3, FORMULA), 0.5: Reference((0.37612843, 31.72), 5e-3, FORMULA)}

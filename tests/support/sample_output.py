@@ -1,10 +1,13 @@
 """A structured mesh of the unit square with a square fibre, and fields on it, as ranks hand them over."""
 
+import json
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from feti_homog.results.field_file import FieldFile
 from feti_homog.results.field_layout import (
     FibrePart,
     Header,
@@ -53,6 +56,18 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     return Sample(
         header, mesh, fibres, _interface(mesh), tuple(_state(mesh, gradient, k) for k, gradient in enumerate(GRADIENTS))
     )
+
+
+def write(directory: Path, whole: Sample, document: dict[str, Any] | None = None) -> Path:
+    """Write result.h5, and result.json if a document is given; returns the path of result.h5."""
+    from mpi4py import MPI
+
+    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
+        for k, state in enumerate(whole.states):
+            file.write_state(k, state)
+    if document is not None:
+        (directory / "result.json").write_text(json.dumps(document))
+    return directory / "result.h5"
 
 
 def part_of(whole: Sample, rank: int, size: int) -> Sample:

@@ -1,7 +1,9 @@
-"""Arcs on the interface: their tips and the nodes within them, counted by hand."""
+"""Arcs on the interface: their tips and the nodes within them, counted by hand and by a search over full turns."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 
 from feti_homog.case.interface_section import Arc
@@ -27,11 +29,6 @@ def test_tips_are_half_an_opening_off_the_centre_and_one_where_they_coincide():
     assert tips([Arc(fibre="all", centre=0.1 + 0.2, angle=0.2)], (), 1) == {0: [0.2, 0.4]}
 
 
-@pytest.mark.parametrize("angle", [0.0, 360.0])
-def test_nothing_and_everything_have_no_tips(angle):
-    assert tips([Arc(fibre="all", angle=angle)], (), 4) == {}
-
-
 def test_nodes_within_arcs_debond_and_tips_stay_bonded():
     assert open_at(Arc(fibre="all", angle=60.0)) == [0, 10, 20, 340, 350]
     assert open_at(Arc(fibre="all", angle=60.1)) == [0, 10, 20, 30, 330, 340, 350]
@@ -43,13 +40,6 @@ def test_nodes_within_arcs_debond_and_tips_stay_bonded():
     near = 30.0 + np.array([-1e-3, -1e-7, 0.0, 1e-7])
     arcs, fibre = [Arc(fibre="all", angle=60.0)], np.ones(4, int)
     assert debonded(arcs, None, fibre, near).tolist() == [True, False, False, False]
-
-
-@pytest.mark.parametrize("turns", [-360.0, 0.0, 360.0])
-def test_centre_and_directions_wrap_around(turns):
-    arcs = [Arc(fibre="all", centre=170.0, angle=60.0)]
-    found = debonded(arcs, None, np.ones(36, int), ROUND + turns)
-    assert ROUND[found].tolist() == [150, 160, 170, 180, 190]
 
 
 def test_opening_takes_the_place_of_the_angle():
@@ -78,13 +68,6 @@ def test_a_fibre_without_a_centre_opens_as_a_whole_only():
     nowhere = np.full(36, np.nan)
     assert not debonded([Arc(fibre="all", angle=359.0)], None, np.ones(36, int), nowhere).any()
     assert debonded([Arc(fibre="all", angle=360.0)], None, np.ones(36, int), nowhere).all()
-
-
-def test_directions_are_about_the_nearest_image():
-    centres, period = np.array([[0.0, 0.0], [0.9, 0.5]]), np.array([1.0, 2.0])
-    points = np.array([[0.1, 0.0], [0.0, 1.9], [0.9, 2.1], [0.1, 0.5], [0.9, 0.3], [0.7, 0.5]])
-    fibre = np.array([0, 0, 0, 1, 1, 1])
-    assert angles(points, fibre, centres, period) == pytest.approx([0.0, -90.0, 135.0, 0.0, -90.0, 180.0])
 
 
 def chains(edges, n):
@@ -156,3 +139,56 @@ def test_faces_that_overlap_or_touch_take_no_work():
     at = np.array([0.0, 0.2])
     work = closing_work(0.2, at, np.array([[-3.0, 1.0], [0.0, 0.0]]), at, np.array([[0.0, 0.0], [0.0, 0.5]]))
     assert work.tolist() == pytest.approx([0.0, 0.5 / 0.4])
+
+
+FIBRES = 3
+HALVES = st.integers(-1440, 1440).map(lambda n: n / 2)
+OPENINGS = st.integers(0, 360).map(float)
+ONE_FIBRE_OR_MORE = st.lists(st.integers(1, FIBRES), min_size=1, max_size=FIBRES, unique=True).map(tuple)
+ARCS = st.lists(
+    st.builds(Arc, fibre=st.just("all") | ONE_FIBRE_OR_MORE, centre=HALVES, angle=st.none() | OPENINGS), max_size=4
+)
+NODES = st.lists(st.tuples(st.integers(1, FIBRES), HALVES), max_size=20)
+
+
+def is_within(arc, opening, fibre, angle):
+    """Return whether a node is within the open arc, after any number of full turns."""
+    if arc.fibre != "all" and fibre not in arc.fibre:
+        return False
+    whole = opening if arc.angle is None else arc.angle
+    return whole >= 360 or any(abs(angle + 360 * turns - arc.centre) < whole / 2 for turns in range(-5, 6))
+
+
+def arrays(nodes):
+    """Fibres (k,) and directions (k,) of nodes."""
+    return np.array([fibre for fibre, _ in nodes], int), np.array([angle for _, angle in nodes], float)
+
+
+@given(ARCS, OPENINGS, NODES)
+def test_nodes_are_debonded_that_lie_within_an_arc_after_any_turns(arcs, opening, nodes):
+    expected = [any(is_within(arc, opening, *node) for arc in arcs) for node in nodes]
+    assert debonded(arcs, opening, *arrays(nodes)).tolist() == expected
+
+
+@given(ARCS, st.lists(OPENINGS, max_size=3))
+def test_tips_are_the_ends_of_all_openings_on_the_circle(arcs, values):
+    expected: dict[int, set[float]] = {}
+    for arc in arcs:
+        for opening in values if arc.angle is None else [arc.angle]:
+            for fibre in range(1, FIBRES + 1) if arc.fibre == "all" else arc.fibre:
+                if 0 < opening < 360:
+                    ends = {(arc.centre + side * opening / 2) % 360 for side in (-1, 1)}
+                    expected.setdefault(fibre - 1, set()).update(ends)
+    assert tips(arcs, values, FIBRES) == {fibre: sorted(expected[fibre]) for fibre in sorted(expected)}
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, FIBRES - 1), HALVES, st.integers(-2, 2), st.integers(-2, 2)), min_size=1),
+    st.lists(st.tuples(st.floats(0, 1), st.floats(0, 2)), min_size=FIBRES, max_size=FIBRES),
+)
+def test_directions_do_not_depend_on_the_image_of_a_point(nodes, centres):
+    period, centres = np.array([1.0, 2.0]), np.array(centres)
+    fibre, angle, across, up = (np.array(column) for column in zip(*nodes, strict=True))
+    arm = 0.3 * np.stack([np.cos(np.radians(angle)), np.sin(np.radians(angle))], axis=1)
+    found = angles(centres[fibre] + arm + np.stack([across, up], axis=1) * period, fibre, centres, period)
+    assert np.abs((found - angle + 180) % 360 - 180).max() < 1e-9

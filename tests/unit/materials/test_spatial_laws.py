@@ -1,13 +1,10 @@
 """Stiffness and expansion in space: fourth-order tensors, closed forms, one form of a material against others."""
 
 import dataclasses
-import tomllib
 
 import numpy as np
 import pytest
-from support.base_case import SPATIAL
 
-from feti_homog.case.cases import parse
 from feti_homog.materials.laws import expansion, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.materials.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 
@@ -96,24 +93,6 @@ def test_a_transversely_isotropic_stiffness_is_that_of_hills_moduli():
     np.testing.assert_allclose(spatial_stiffness(AS4), expected, rtol=1e-12, atol=1e-12)
 
 
-def test_the_shear_modulus_in_the_plane_is_in_place_of_the_ratio():
-    sheared = dataclasses.replace(AS4, nu_transverse=None, G_transverse=14.0 / 2.5)
-    assert spatial_stiffness(sheared)[5, 5] == pytest.approx(5.6, rel=1e-12)
-    np.testing.assert_allclose(spatial_stiffness(sheared), spatial_stiffness(AS4), rtol=1e-12)
-    for plane in ("strain", "stress"):
-        np.testing.assert_allclose(plane_stiffness(sheared, plane), plane_stiffness(AS4, plane), rtol=1e-12)
-        np.testing.assert_allclose(out_of_plane(sheared, plane), out_of_plane(AS4, plane), rtol=1e-12)
-
-
-def test_ratios_of_a_transversely_isotropic_material_are_those_of_its_tests():
-    """nu_axial: across under stress along x3; nu_transverse: in the plane under stress there."""
-    stretched = np.linalg.solve(spatial_stiffness(AS4), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(-stretched[:2] / stretched[2], AS4.nu_axial, rtol=1e-12)
-    across = np.linalg.solve(spatial_stiffness(AS4), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert -across[1] / across[0] == pytest.approx(AS4.nu_transverse, rel=1e-12)
-    assert 1 / across[0] == pytest.approx(AS4.E_transverse, rel=1e-12)
-
-
 @pytest.mark.parametrize("angle", ANGLES)
 def test_rotation_is_that_of_the_fourth_order_tensor(angle):
     own = tensor(np.linalg.inv(compliance(ORTHOTROPIC)))
@@ -142,19 +121,6 @@ def test_expansions_stand_in_their_places():
     assert expansion(General(rows(np.eye(3)), (1.0, 2.0, 3.0)))[2] == 3.0
     assert all(expansion(material) is None for material in (AS4, Isotropic(1.0, 0.2), General(rows(np.eye(3)))))
     assert list(expansion(Isotropic(1.0, 0.2, 0.0))) == [0.0] * 6
-
-
-@pytest.mark.parametrize(("name", "place"), [("G23", 3), ("G13", 4), ("G12", 5)])
-def test_each_shear_modulus_is_that_of_its_plane(name, place):
-    strain = np.zeros(6)
-    strain[place] = 0.01
-    stress = spatial_stiffness(ORTHOTROPIC) @ strain
-    expected = np.zeros(6)
-    expected[place] = getattr(ORTHOTROPIC, name) * 0.01
-    np.testing.assert_allclose(stress, expected, atol=1e-14)
-    # turned by a right angle, axis 1 is x2 and axis 2 is -x1: 13 and 23 change places
-    turned = spatial_stiffness(dataclasses.replace(ORTHOTROPIC, angle=90.0))
-    assert turned[{3: 4, 4: 3, 5: 5}[place], {3: 4, 4: 3, 5: 5}[place]] == pytest.approx(getattr(ORTHOTROPIC, name))
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -246,14 +212,6 @@ def test_transversely_isotropic_constants_are_refused_where_their_compliance_has
     assert 100 < sum(refused) < 300
 
 
-@pytest.mark.parametrize("poisson", [-0.999999, -0.4, 0.0, 0.49, 0.4999999])
-def test_isotropic_constants_within_their_limits_are_stable(poisson):
-    stiffness = spatial_stiffness(Isotropic(2.0, poisson))
-    assert np.linalg.eigvalsh(stiffness).min() > 0.0
-    k = 2.0 / (3 * (1 - 2 * poisson))
-    assert stiffness[:3, :3].sum() / 9 == pytest.approx(k, rel=1e-6)
-
-
 def test_a_stiffness_is_refused_where_an_eigenvalue_is_negative():
     random = np.random.default_rng(7)
     refused = []
@@ -277,20 +235,3 @@ def test_a_coupling_to_the_shears_along_x3_is_refused_by_its_name(entry):
             plane_stiffness(General(rows(given)), plane)
     given[i, j] = given[j, i] = 1e-12
     np.testing.assert_array_equal(spatial_stiffness(General(rows(given))), 10.0 * np.eye(6))
-
-
-def test_a_case_gives_the_law_of_its_phases(tmp_path):
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.3},
-        "material": {
-            "matrix": {"young": 3.0, "poisson": 0.35, "expansion": 54e-6},
-            "fibre": {"stiffness": tomllib.loads(SPATIAL)["stiffness"], "expansion": [1, 2.0, 3]},
-        },
-        "analysis": {"type": "stiffness", "plane": "generalized"},
-    }
-    case = parse(document, tmp_path)
-    np.testing.assert_array_equal(
-        spatial_stiffness(case.material_of("fibre")), document["material"]["fibre"]["stiffness"]
-    )
-    np.testing.assert_array_equal(expansion(case.material_of("fibre")), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(expansion(case.material_of("matrix")), [54e-6, 54e-6, 54e-6, 0.0, 0.0, 0.0])

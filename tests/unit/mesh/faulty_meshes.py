@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.msh_reader import read
 
 Nodes = dict[int, tuple[float, float, float]]
 # Element tag -> (gmsh element type, physical surface, entity, node tags).
@@ -35,6 +40,13 @@ class MshFile:
         for tag, (kind, physical, entity, nodes) in self.elements.items():
             lines.append(" ".join(map(str, (tag, kind, 2, physical, entity, *nodes))))
         path.write_text("\n".join([*lines, "$EndElements", ""]))
+
+    def faults(self, folder: Path, **keys: Any) -> tuple[str, ...]:
+        """Return the faults of reading the mesh, which is written as faulty.msh."""
+        self.write(folder / "faulty.msh")
+        with pytest.raises(MeshError) as caught:
+            read(folder / "faulty.msh", **keys)
+        return caught.value.faults
 
     def moved(self, **places: Sequence[float]) -> MshFile:
         """With nodes n7=(x, y[, z]) elsewhere."""

@@ -1,11 +1,13 @@
-"""Meshes of coated fibres: circles within circles, cut by the sides of the cell, thick and thin."""
+"""Meshes of coated circles and ellipses, cut by the sides of the cell, thick and thin; coatings that overlap."""
 
 import numpy as np
 import pytest
 from support.generated_meshes import generate, mesh_of_discs
 from support.subdomains import cut
+from unit.mesh.test_table_ellipses import ROWS, cell_of, table
 
 from feti_homog.case.cell_section import Cell
+from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
 from feti_homog.mesh.mesh_fibres import fibre_circles
@@ -22,22 +24,26 @@ CELLS = {
 }
 
 
-@pytest.mark.parametrize("name", CELLS)
-def test_each_phase_has_the_area_of_its_circles_and_no_element_turns_over(name):
-    cell = CELLS[name]
-    discs, torus = arrange(cell), Torus.of(generate(cell))
-    mesh = torus.mesh
-    assert mesh.phases == ("matrix", "fibre", "coating")
-    assert len(double_arcs(mesh.triangles, mesh.arc_edges, mesh.arc_circle, len(mesh.points))[0]) == 0
-    shares = np.zeros(3)
-    for piece in cut(torus, torus.constituent):
-        fine = refine(piece, ReferenceLattice.of(4, 1))
+def body_areas(mesh, refinements=4):
+    """(constituents,) areas within the refined polygons, none of whose elements may turn over."""
+    torus, lattice = Torus.of(mesh), ReferenceLattice.of(refinements, 1)
+    found = np.zeros(torus.constituent.max() + 1)
+    for submesh in cut(torus, torus.constituent):
+        fine = refine(submesh, lattice)
         own = areas(fine.points, fine.triangles)
         assert own.min() > 0
-        shares[mesh.phases.index(piece.phase)] += own.sum()
-    fibres = np.pi * (discs.radii**2).sum()
-    outer = np.pi * (discs.outer_radii**2).sum()
-    assert shares == pytest.approx([mesh.width * mesh.height - outer, fibres, outer - fibres], rel=1e-3)
+        found[submesh.body] = own.sum()
+    return found
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_each_body_has_the_area_of_its_circles(name):
+    discs, mesh = arrange(CELLS[name]), generate(CELLS[name])
+    assert mesh.phases == ("matrix", "fibre", "coating")
+    assert len(double_arcs(mesh.triangles, mesh.arc_edges, mesh.arc_circle, len(mesh.points))[0]) == 0
+    inner, outer = np.pi * discs.radii**2, np.pi * discs.outer_radii**2
+    expected = [mesh.width * mesh.height - outer.sum(), *inner, *(outer - inner)]
+    assert body_areas(mesh) == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -75,11 +81,53 @@ def test_bare_and_coated_fibres_go_together():
     assert Torus.of(mesh).constituent_phase.tolist() == [0, 1, 2, 3]
 
 
-def test_gaps_are_those_of_the_coatings():
-    cell = Cell(geometry="random", fibre_fraction=0.3, coating=0.2, fibres=8, seed=1, min_gap=0.05)
-    discs = arrange(cell)
-    vector = discs.centres[:, None] - discs.centres
-    distance = np.linalg.norm(vector - np.round(vector), axis=2) + 9 * np.eye(8)
-    gap = distance - discs.outer_radii[:, None] - discs.outer_radii
-    assert np.pi * (discs.radii**2).sum() == pytest.approx(0.3)
-    assert gap.min() >= 0.05 * 2 * discs.radii.mean() * (1 - 1e-9)
+COATED = [ROWS[0] | {"coating": 0.1}, ROWS[1] | {"coating": 0.05}, ROWS[2], {"x": 0.5, "y": 0.85, "radius": 0.07}]
+COATED[3] |= {"coating": 0.2}
+
+
+@pytest.mark.parametrize("corner", [None, (0.0, 0.0), (-0.2, -0.27), (-0.46, -0.4)])
+@pytest.mark.parametrize("interface_size", [None, 0.02])
+def test_each_body_has_the_area_of_its_ellipses(corner, interface_size):
+    """Semi-axes are longer by coating sqrt(a b) with the coating; wherever the sides of the cell cut them."""
+    begin = dict(zip("xy", corner or (0.0, 0.0), strict=True))
+    rows = [row | {axis: low + (row[axis] - low) % 1.0 for axis, low in begin.items()} for row in COATED]
+    mesh = generate(cell_of(table(rows, corner), interface_size=interface_size))
+    assert mesh.phases == ("matrix", "fibre", "glass", "coating")
+    assert len(double_arcs(mesh.triangles, mesh.arc_edges, mesh.arc_circle, len(mesh.points))[0]) == 0
+    a, b = (np.array([row.get(key, row.get("radius")) for row in COATED]) for key in "ab")
+    thick = np.array([row.get("coating", 0.0) for row in COATED]) * np.sqrt(a * b)
+    inner, outer = np.pi * a * b, np.pi * (a + thick) * (b + thick)
+    rings = (outer - inner)[thick > 0]
+    assert body_areas(mesh) == pytest.approx([1 - outer.sum(), *inner, *rings], rel=2e-3)
+
+
+def test_coatings_of_nearly_round_ellipses_are_those_of_discs():
+    rows = [{"x": 0.3, "y": 0.2, "a": 0.2 + 1e-9, "b": 0.2, "angle": 37.0, "coating": 0.1}]
+    disc = [{"x": 0.3, "y": 0.2, "radius": 0.2, "coating": 0.1}]
+    found, expected = (body_areas(generate(cell_of(table(each)))) for each in (rows, disc))
+    assert found == pytest.approx(expected, rel=2e-4)
+
+
+def test_centres_of_coatings_are_those_of_the_fibres():
+    cell = cell_of(table(COATED))
+    centres = fibre_circles(Torus.of(generate(cell)))[1:, :2]
+    away = centres - arrange(cell).centres[[0, 1, 2, 3, 0, 1, 3]]
+    assert np.abs(away - np.round(away)).max() < 1e-12
+
+
+def test_thin_coatings_of_thin_ellipses_have_good_elements():
+    rows = [{"x": 0.5, "y": 0.5, "a": 0.4, "b": 0.05, "angle": 20.0, "coating": 0.02}]
+    mesh = generate(cell_of(table(rows)))
+    sides = np.linalg.norm(mesh.points[mesh.triangles] - mesh.points[np.roll(mesh.triangles, 1, axis=1)], axis=2)
+    quality = 4 * np.sqrt(3) * areas(mesh.points, mesh.triangles) / (sides**2).sum(axis=1)
+    assert quality.min() > 0.1 and len(mesh.triangles) < 8000
+    body_areas(mesh)
+
+
+def test_coatings_that_overlap_are_reported():
+    """The second lies above the first, 0.05 apart; coatings of a tenth of 0.2 are 0.02 thick each."""
+    rows = [{"x": 0.5, "y": y, "a": 0.4, "b": 0.1} for y in (0.3, 0.55)]
+    arrange(cell_of(table([row | {"coating": 0.1} for row in rows])))
+    with pytest.raises(MeshError) as error:
+        arrange(cell_of(table([row | {"coating": 0.15} for row in rows])))
+    assert "[cell] t.csv: rows 1 and 2: overlap by 0.01" in error.value.faults

@@ -1,4 +1,4 @@
-"""Voids in tables and in random cells: where they are, the mesh around them, fibres that stay as they were, faults."""
+"""Voids in tables, random cells and hollow fibres: the mesh around them, fibres that stay as they were, faults."""
 
 import fibre_statistics
 import numpy as np
@@ -17,6 +17,7 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh import Torus
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 MATRIX = {"young": 3.0, "poisson": 0.35}
@@ -172,3 +173,35 @@ def test_a_void_is_no_fibre_that_can_debond(tmp_path):
     }
     with pytest.raises(CaseError, match=r"debonded\[0\].fibre = 2: expected at most 1; the cell has 1 fibres"):
         run(cases.parse(document, tmp_path), MPI.COMM_SELF)
+
+
+TUBE = {"x": 0.0, "y": 0.0, "radius": 0.2, "inner_radius": 0.12}
+OVAL = {"x": 0.5, "y": 0.1, "a": 0.16, "b": 0.08, "angle": 30.0}
+
+
+@pytest.mark.parametrize("more", [[], [OVAL]], ids=["circles", "ellipses"])
+def test_a_hollow_fibre_is_a_ring_around_a_void(tmp_path, more):
+    coated = {"x": 0.5, "y": 0.5, "radius": 0.2, "coating": 0.2}
+    rows = [coated, TUBE, {"x": 0.05, "y": 0.5, "radius": 0.15, "phase": "void"}, *more]
+    mesh = generate(case_of(tmp_path, table(rows, mesh_size=0.03), "fibre", "coating").cell)
+    torus, found = Torus.of(mesh), areas(mesh.points, mesh.triangles)
+    assert torus.voids == 2 and mesh.phases == ("matrix", "fibre", "coating")
+    own = (mesh.precedence == 2) & (mesh.phase == 1)
+    assert found[own].sum() == pytest.approx(np.pi * (0.2**2 - 0.12**2), rel=0.02)
+    assert 1 - found.sum() == pytest.approx(np.pi * (0.12**2 + 0.15**2), rel=0.02)
+    tube = np.unique(torus.constituent[own])
+    assert len(tube) == 1 and fibre_circles(torus)[tube[0], 2] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("row", "words"), [
+    (TUBE | {"inner_radius": 0.2}, "expected inner_radius / radius from 0.05 to 0.98, or 0"),
+    (TUBE | {"inner_radius": 0.001}, "expected inner_radius / radius from 0.05 to 0.98, or 0"),
+    (TUBE | {"inner_radius": -0.1}, "inner_radius = -0.1: expected a number at least 0"),
+    (TUBE | {"coating": 0.1}, "has an inner_radius and a coating; give one"),
+    (TUBE | {"phase": "void"}, "inner_radius = 0.12: a void has none"),
+    (OVAL | {"inner_radius": 0.05}, "has an inner_radius, which only round fibres may have"),
+])  # fmt: skip
+def test_faults_of_hollow_fibres(tmp_path, row, words):
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, table([row, OVAL]), "fibre", *["coating"] * ("coating" in row))
+    assert caught.value.faults[0].endswith(f"row 1: {words}")

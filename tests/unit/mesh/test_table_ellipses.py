@@ -51,13 +51,6 @@ def test_equal_semi_axes_make_discs(interface_size):
     assert np.array_equal(mesh.ellipses.circles, expected.ellipses.circles)
 
 
-def test_nearly_equal_semi_axes_nearly_make_discs():
-    """Nearly round fibres are meshed as ellipses."""
-    rows = [{"x": 0.3, "y": 0.2, "a": 0.2 + 1e-9, "b": 0.2, "angle": 37.0}, {"x": 0.8, "y": 0.7, "radius": 0.15}]
-    areas_ = [fibre_areas(generate(cell_of(table(each)))) for each in (rows, [rows[1] | {"x": 0.3, "y": 0.2}, rows[1]])]
-    assert areas_[0] == pytest.approx(areas_[1] * np.array([0.2 / 0.15, 1.0]) ** 2, rel=2e-8)
-
-
 @pytest.mark.parametrize("corner", [(0.0, 0.0), (-0.2, -0.27), (-0.61, -0.31), (-0.46, -0.4)])
 def test_nodes_of_interfaces_lie_on_the_ellipses(corner):
     """Wherever the cell's sides cut them; fibres are numbered in the order of the rows."""

@@ -12,7 +12,6 @@ from feti_homog.results.path_curves import (
     first_leg,
     largest_of_legs,
     leading_component,
-    load_controlled,
     named_components,
     rising_strain,
     shown_stresses,
@@ -25,15 +24,6 @@ def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
     strain = 0.1 * load
     stress = [stiffness * strain, 0.0, 0.0]
     return {"load_factor": load, "strain": [strain, 0.0, 0.0], "stress": stress, "broke": broke, "dissipated": 0.0}
-
-
-def test_snap_back_becomes_a_drop_to_the_next_branch_that_holds() -> None:
-    # Rays of falling stiffness; the second and third break below the load of the first.
-    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
-    found = load_controlled(points)[:, [3, 0]]
-    expected = [[0, 0], [0.05, 0.5], [0.05, 0.2], [0.08, 0.32], [0.08, 0.16], [0.1, 0.2]]
-    np.testing.assert_allclose(found, expected, atol=1e-15)
-    np.testing.assert_allclose(load_controlled([point(1.0, 3.0, 0)])[:, [3, 0]], [[0, 0], [0.1, 0.3]])
 
 
 def document(method: str, waypoints: int, points: list[dict[str, Any]]) -> dict[str, Any]:
@@ -60,33 +50,12 @@ def test_the_peak_is_the_largest_stress_with_the_first_break_and_what_is_left(si
     assert {1, 4, 5} <= set(chosen(path, 5))
 
 
-def test_the_valley_after_a_peak_of_increments_is_a_point_and_saw_teeth_are_none() -> None:
-    stresses = [0.4, 1.0, 0.995, 0.998, 0.5, 0.7]
-    points = [point(n / 6, 60 * s / n, int(n > 1)) for n, s in enumerate(stresses, 1)]
-    found = peak_of(document("increments", 1, points))
-    assert (found["event"], found["first_break_event"], found["event_left"]) == (1, 1, 4)
-    assert found["stress_left"] == pytest.approx(0.5)
-    cut = document("increments", 1, points[:4])
-    assert "event_left" not in peak_of(cut) and peak_of(cut)["so_far"] and "so_far" not in found
-    assert marks(cut) == {1: "first break and largest so far", 3: "end"}
-
-
 def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
     """The matrix alone stiffens the cell again, and unloading breaks nothing."""
     stresses, broke = [2.0, 1.9, 1.95, 0.7, 4.0, 0.5], [1, 1, 1, 1, 0, 0]
     points = [point(n / 6, 60 * s / n, b) for n, (s, b) in enumerate(zip(stresses, broke, strict=True), 1)]
     found = peak_of(document("increments", 1, points))
     assert (found["event"], found["event_left"], found["stress"]) == (0, 3, pytest.approx(2.0))
-
-
-def test_a_small_early_fall_of_events_is_no_peak_of_a_path_that_rises_beyond() -> None:
-    """At load 0.5 the stress falls by 3 %, then by 10 %, on branches that carry more in the end."""
-    for stiffness, event in ((9.7, 2), (9.0, 0)):
-        points = [point(0.5, 10.0), point(0.48, stiffness), point(1.0, stiffness, 0)]
-        path = document("events", 1, points)
-        peak = peak_of(path)
-        assert peak["event"] == event and ("event_left" in peak) == (event == 0)
-        assert marks(path)[event] == ("first break and peak" if event == 0 else "largest stress and end")
 
 
 def test_rising_strain_is_that_of_the_first_leg() -> None:
@@ -99,18 +68,6 @@ def test_rising_strain_is_that_of_the_first_leg() -> None:
     path = mixed({"S11": 1.0}, [[t, 0, 0] for t in (0.5, 1.0)], "strain")
     path["path"][0]["strain"][0] = 5.0
     assert rising_strain(path) is None
-
-
-@pytest.mark.parametrize(("count", "rows"), [(1, 6), (6, 6), (7, 6), (500, 15), (3, 2)])
-def test_the_first_and_the_last_state_are_drawn(count: int, rows: int) -> None:
-    numbers = chosen(document("events", 1, [point(0.5, 1.0) for _ in range(count)]), rows)
-    assert numbers[0] == 0 and numbers[-1] == count - 1 and numbers == sorted(set(numbers))
-    assert len(numbers) == min(count, rows)
-
-
-def test_drawn_states_are_where_bonds_break() -> None:
-    points = [point(0.01 * n, 1.0, broke=5 if n in (40, 60, 80) else 0) for n in range(101)]
-    assert chosen(document("events", 1, points), 5) == [0, 40, 60, 100]
 
 
 def test_the_ends_of_legs_are_drawn() -> None:

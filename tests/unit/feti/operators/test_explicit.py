@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from reference.dense_feti import boundary_of, kernel, schur
-from scipy.sparse import csr_matrix, diags, identity
+from scipy.sparse import csr_matrix, identity
 from support import torn_cells
 
 from feti_homog.fem.problem import PLANE
-from feti_homog.feti.linalg.dense_matrices import schur_complement
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator, Interior
 
 TIGHT = 1e-10
@@ -124,15 +123,6 @@ def test_dense_matrices_are_those_that_are_applied(parts):
         assert np.abs(regularisation - (regularised - operator.S)).max() < TIGHT * np.abs(S).max()
         inverse = applied(operator.apply_flexibility, np.eye(len(dofs)))
         assert np.abs(regularised @ inverse - np.eye(len(dofs))).max() < 1e-8
-
-
-def test_schur_complements_are_those_of_dense_algebra():
-    A = csr_matrix(np.diag([2.0, 3.0]) + 1.0)
-    assert (schur_complement(A, np.arange(2)) == A.toarray()).all()
-    n, dofs = 30, np.array([1, 4, 5, 17, 29])
-    A = csr_matrix(diags([np.arange(n) + 4.0, np.full(n - 1, -1.5), np.full(n - 1, -1.5)], [0, 1, -1]))
-    expected = np.linalg.inv(np.linalg.inv(A.toarray())[np.ix_(dofs, dofs)])
-    assert np.abs(schur_complement(A, dofs) - expected).max() < 1e-12
 
 
 def test_indefinite_subdomain_is_refused():

@@ -143,7 +143,6 @@ def test_paths_with_reversals_are_those_of_slow_ones(seed):
         assert heat == pytest.approx(point.heat, abs=1e-8)
 
 
-@pytest.mark.slow
 def is_admissible(search, status):
     x, balanced = search.faces.linear(status, search.load, search.start)
     return (
@@ -151,6 +150,7 @@ def is_admissible(search, status):
     )
 
 
+@pytest.mark.slow
 def test_paths_of_much_friction_end_where_no_statuses_go_on():
     """Random paths with mu up to 3: those that stop do where trials of all find no rates, or none that are resisted.
 

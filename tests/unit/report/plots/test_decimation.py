@@ -1,4 +1,4 @@
-"""Displacements in pictures: the translation that is drawn, and the scale at which no triangle turns over."""
+"""Displacements and stresses in pictures: the translation, the scale at which no triangle turns over, nodal values."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from support.sample_output import Sample, in_space, sample
+from support.sample_output import in_space, sample, write
 
 from feti_homog.report.plots import deformed_panels, plot_helpers
 from feti_homog.report.plots.decimation import (
@@ -18,16 +18,7 @@ from feti_homog.report.plots.decimation import (
     largest_scale,
     node_means,
 )
-from feti_homog.results.field_file import FieldFile
-
-
-def write(directory: Path, whole: Sample) -> Path:
-    from mpi4py import MPI
-
-    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
-        for k, state in enumerate(whole.states):
-            file.write_state(k, state)
-    return directory / "result.h5"
+from feti_homog.report.plots.drawn_cell import DrawnCell
 
 
 def square() -> DrawnMesh:
@@ -116,3 +107,24 @@ def test_no_triangle_of_a_magnified_state_turns_over(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_panels_leave_few_places_empty(panels, ratio, grid):
     assert deformed_panels._grid(panels, ratio) == grid
+
+
+@pytest.mark.parametrize(
+    ("stress", "S33", "axial", "expected"),
+    [
+        ([3.0, 0.0, 0.0], 0.0, None, 3.0),
+        ([0.0, 0.0, 2.0], 0.0, None, 2.0 * np.sqrt(3.0)),
+        ([5.0, 5.0, 0.0], 5.0, [0.0, 0.0], 0.0),
+        ([0.0, 0.0, 0.0], 0.0, [3.0, -4.0], 5.0 * np.sqrt(3.0)),
+    ],
+)
+def test_a_uniform_stress_has_its_von_mises_stress(
+    tmp_path: Path, stress: list[float], S33: float, axial: list[float] | None, expected: float
+) -> None:
+    with h5py.File(write(tmp_path, sample(3) if axial is None else in_space(sample(3))), "r+") as file:
+        state, values = file["state/1"], {"stress": stress, "stress_33": S33, "axial_stress": axial}
+        for name, value in values.items():
+            if value is not None:
+                state[name][:] = value
+        drawn = DrawnCell.of(file).drawn
+        np.testing.assert_allclose(plot_helpers.nodal_stress(state, "von_mises", drawn), expected, atol=1e-12)

@@ -1,6 +1,5 @@
 """Text of pictures: legends, scales, numbers of points."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from PIL import Image
 from support.figure_words import panels
-from support.sample_output import Sample, in_space, sample
+from support.sample_output import in_space, sample, write
 
 from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves
 from feti_homog.report.plots.drawn_cell import BONDED, CLOSED, LoadLabels
 from feti_homog.report.plots.path_picture import figure as path_picture
-from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
 pytestmark = pytest.mark.slow
@@ -35,29 +33,31 @@ def path_of(strains: list[float]) -> dict[str, Any]:
     return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, "path": points}
 
 
-def write(directory: Path, whole: Sample, document: dict[str, Any] | None) -> None:
-    from mpi4py import MPI
-
-    *parts, states = vars(whole).values()
-    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
-        for k, state in enumerate(states):
-            file.write_state(k, state)
-    if document is not None:
-        (directory / "result.json").write_text(json.dumps(document))
-
-
-def drawn(directory: Path, monkeypatch: Any, look: plot_helpers.Look = plot_helpers.PLAIN) -> dict[str, Figure]:
-    """Return the figures of a result by the names of their files."""
+def drawn(directory: Path, look: plot_helpers.Look = plot_helpers.PLAIN) -> dict[str, Figure]:
+    """Return the figures of a result by the names of their files, without the animation."""
     found: dict[str, Figure] = {}
 
     def keep(figure: Figure, path: Path, look: plot_helpers.Look) -> Path:
-        FigureCanvasAgg(figure).draw()
         found[path.name] = figure
         return path
 
-    monkeypatch.setattr(plot_helpers, "save", keep)
-    figures.plot(directory, look)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plot_helpers, "save", keep)
+        patch.setattr(deformed_panels, "animation", lambda *_: directory)
+        figures.plot(directory, look)
     return found
+
+
+@pytest.fixture(scope="module")
+def of_cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Figure]:
+    """Provide the figures of unit strains."""
+    return drawn(write(tmp_path_factory.mktemp("cases"), sample(4)).parent)
+
+
+@pytest.fixture(scope="module")
+def of_path(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Figure]:
+    """Provide the figures of a path whose load falls once."""
+    return drawn(write(tmp_path_factory.mktemp("path"), sample(4), path_of([0.5, 0.2, 1.0])).parent)
 
 
 def legends(figure: Figure) -> list[Legend]:
@@ -69,11 +69,10 @@ def entries(figure: Figure) -> list[str]:
     return [text.get_text() for legend in legends(figure) for text in legend.get_texts()]
 
 
-@pytest.mark.parametrize("document", [None, path_of([0.5, 0.2, 1.0])], ids=["load cases", "path"])
-def test_legends_cover_nothing(tmp_path: Path, monkeypatch: Any, document: dict[str, Any] | None) -> None:
-    write(tmp_path, sample(4), document)
-    for name, figure in drawn(tmp_path, monkeypatch).items():
-        renderer: Any = FigureCanvasAgg(figure).get_renderer()
+def test_legends_cover_nothing(of_cases: dict[str, Figure], of_path: dict[str, Figure]) -> None:
+    for name, figure in [*of_cases.items(), *of_path.items()]:
+        (canvas := FigureCanvasAgg(figure)).draw()
+        renderer: Any = canvas.get_renderer()
         boxes = [axes.get_window_extent(renderer) for axes in figure.axes if axes.axison]
         boxes += [axes.xaxis.label.get_window_extent(renderer) for axes in figure.axes if axes.axison]
         for legend in legends(figure):
@@ -89,19 +88,16 @@ def test_a_picture_has_no_white_around_it(tmp_path: Path) -> None:
         assert picture.size == pytest.approx((0.2 * 800 + 40, 40), abs=12)
 
 
-def test_the_grey_outline_has_its_name(tmp_path: Path, monkeypatch: Any) -> None:
-    write(tmp_path, sample(4), None)
-    assert entries(drawn(tmp_path, monkeypatch)["case_E11.png"]) == ["in contact", "open", "undeformed"]
+def test_the_grey_outline_has_its_name(of_cases: dict[str, Figure]) -> None:
+    assert entries(of_cases["case_E11.png"]) == ["in contact", "open", "undeformed"]
 
 
 @pytest.mark.parametrize(("status", "names"), [(CLOSED, ["in contact"]), (2, ["open"])])
-def test_the_legend_of_tractions_has_only_what_is_there(
-    tmp_path: Path, monkeypatch: Any, status: int, names: list[str]
-) -> None:
+def test_the_legend_of_tractions_has_only_what_is_there(tmp_path: Path, status: int, names: list[str]) -> None:
     whole = sample(4)
     states = tuple(replace(state, status=np.where(state.status == BONDED, BONDED, status)) for state in whole.states)
     write(tmp_path, replace(whole, states=states), None)
-    assert [text.get_text() for text in drawn(tmp_path, monkeypatch)["interface.png"].legends[0].texts] == names
+    assert [text.get_text() for text in drawn(tmp_path)["interface.png"].legends[0].texts] == names
 
 
 @pytest.mark.parametrize(
@@ -114,7 +110,7 @@ def test_narrow_openings_are_seen(displacement: float, opening: float, scale: fl
     assert found == pytest.approx(scale)
 
 
-def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path) -> None:
     whole, small = sample(4), 0.002
     states = tuple(
         replace(s, strain=small * s.strain, displacement=small * s.displacement, jump=0.2 * small * s.jump)
@@ -125,10 +121,10 @@ def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkey
         scale = deformed_panels.shown_scale(file, path_of([0.001, 0.0015, 0.002]))
         opening = max(file[f"state/{k}/jump"][:, 0].max() for k in range(3))
     assert scale * opening > 0.02
-    title: Any = drawn(tmp_path, monkeypatch)["path_states.png"].get_suptitle()
+    title: Any = drawn(tmp_path)["path_states.png"].get_suptitle()
     assert title.endswith(f"displacement × {scale:g}")
     # Another title leaves the scale in the picture.
-    panels = drawn(tmp_path, monkeypatch, plot_helpers.Look(title=""))["path_states.png"]
+    panels = drawn(tmp_path, plot_helpers.Look(title=""))["path_states.png"]
     assert panels.axes[-1].get_ylabel().endswith(f"displacement × {scale:g}")
 
 
@@ -183,18 +179,17 @@ def test_words_of_a_path_with_many_strains_are_the_leading_one_and_its_stress(st
     assert LoadLabels.of(document).words(few) == ["$E_{22}={0.05}$", r"$\gamma_{13}={0.001}$"]
 
 
-def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path) -> None:
     whole = sample(4)
     point = {"strain": [0.02, -0.01, 0.003], "stress": [6.0, 0.0, 0.0]}
     case = {"analysis": {"type": "load", "plane": "strain"}, "load": {"to": {"S11": 6.0}}, "output": {}}
     write(tmp_path, replace(whole, states=whole.states[:1]), {"schema": SCHEMA, "case": case, "load": point})
-    title = drawn(tmp_path, monkeypatch)["load.png"].axes[0].get_title()
+    title = drawn(tmp_path)["load.png"].axes[0].get_title()
     assert r"$\Sigma_{11}={6}$" in title and "E_" not in title
 
 
-def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
-    write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
-    figure = drawn(tmp_path, monkeypatch)["path.png"]
+def test_points_of_a_path_are_numbered_where_its_curve_folds_back(of_path: dict[str, Figure]) -> None:
+    figure = of_path["path.png"]
     upper, lower = figure.axes
     assert {"0", "1", "2"} <= {text.get_text() for text in upper.texts if isinstance(text, Annotation)}
     np.testing.assert_allclose(lower.lines[0].get_xdata(), [0.5, 0.2, 1.0])
@@ -236,11 +231,11 @@ def test_curves_against_the_angle_have_their_names_and_units(kind: str) -> None:
         assert list(values) == [place, 2 * place], name
 
 
-def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypatch: Any) -> None:
+def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path) -> None:
     """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
     whole = sample(4)
     write(tmp_path, in_space(whole), None)
-    picture = drawn(tmp_path, monkeypatch)["interface.png"]
+    picture = drawn(tmp_path)["interface.png"]
     assert picture.get_suptitle().endswith(", one of the loads")
     traction, jump, *_ = panels(picture)
     assert (traction[1], jump[1]) == ("traction (GPa)", "jump (mm)")

@@ -1,4 +1,4 @@
-"""Panels of states: evenly spaced angles, titles apart, colours of their own; debonded arcs in cell.png; units."""
+"""Panels of states, debonded arcs and units in pictures, of narrow and flat cells and of long names, too."""
 
 import json
 from dataclasses import replace
@@ -9,12 +9,16 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
-from support.sample_output import Sample, sample
+from PIL import Image
+from support.sample_output import sample, write
 
 from feti_homog.report.plots import cell_picture, deformed_panels, drawn_cell, path_picture, plot_helpers
+from feti_homog.report.plots.drawn_cell import bar_beside, figure_of, label_cell_axes
+from feti_homog.report.plots.plot_helpers import DPI, save
 from feti_homog.report.text import tables
-from feti_homog.results.field_file import FieldFile
 
 COUNTS = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
 POINTS = [COUNTS | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in (0.5, 0.2, 1.0)]
@@ -27,16 +31,6 @@ PATH = {
     },
     "path": POINTS,
 }
-
-
-def written(directory: Path, whole: Sample) -> Path:
-    from mpi4py import MPI
-
-    *parts, states = vars(whole).values()
-    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
-        for k, state in enumerate(states):
-            file.write_state(k, state)
-    return directory / "result.h5"
 
 
 @pytest.mark.parametrize(("last", "count"), [(180, 7), (180, 13), (360, 7), (180, 19), (180, 37), (180, 5), (90, 3)])
@@ -57,7 +51,7 @@ def test_other_numbers_of_angles_have_panels_too(count: int) -> None:
 @pytest.mark.parametrize("lines", [1, 2, 4])
 def test_titles_of_panels_leave_the_title_of_the_figure_free(tmp_path: Path, monkeypatch: Any, lines: int) -> None:
     monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda _: dict.fromkeys(range(3), "peak\n" * lines))
-    with h5py.File(written(tmp_path, sample(4))) as file:
+    with h5py.File(write(tmp_path, sample(4))) as file:
         figure = deformed_panels.panels(file, json.loads(json.dumps(PATH)), 1.0)
         (canvas := FigureCanvasAgg(figure)).draw()
         renderer: Any = canvas.get_renderer()
@@ -72,7 +66,7 @@ def test_columns_of_panels_are_even_if_the_end_has_colours_of_its_own(tmp_path: 
     states = [replace(first, point=k, stress=first.stress * (1.0 if k < 4 else 10.0)) for k in range(5)]
     monkeypatch.setattr(deformed_panels.landmarks, "marks", lambda _: dict.fromkeys(range(4), "peak") | {4: "end"})
     monkeypatch.setattr(deformed_panels, "_grid", lambda *_: (2, 3))
-    with h5py.File(written(tmp_path, replace(whole, states=tuple(states)))) as file:
+    with h5py.File(write(tmp_path, replace(whole, states=tuple(states)))) as file:
         figure = deformed_panels.panels(file, document, 1.0)
     panels = [axes for axes in figure.axes if axes.get_title().startswith(("peak", "end"))]
     assert len(panels) == 5 and any("own colours" in axes.get_title() for axes in panels)
@@ -111,7 +105,7 @@ def test_crowded_points_have_no_numbers() -> None:
 
 def test_drawings_leave_the_common_colours_without_listeners(tmp_path: Path) -> None:
     """Frames of an animation come and go; the colours that they share outlive them."""
-    with h5py.File(written(tmp_path, sample(4))) as file:
+    with h5py.File(write(tmp_path, sample(4))) as file:
         cell = deformed_panels.DeformedCell.of_states(file, range(3), PATH, 1.0, 10_000)
         axes = plot_helpers.PLAIN.figure(4.0, 4.0).subplots()
         shapes = cell.draw(axes, 0, cell.moved(0))
@@ -126,7 +120,7 @@ def test_the_cell_shows_arcs_that_are_debonded_before_the_load(tmp_path: Path, d
     some = np.arange(len(whole.states[0].status)) < 3
     initial = np.where(some, drawn_cell.CLOSED, drawn_cell.BONDED) * debonded
     states = replace(whole.states[0], status=initial), *whole.states[1:]  # breaks under the load do not count
-    with h5py.File(written(tmp_path, replace(whole, states=states))) as file:
+    with h5py.File(write(tmp_path, replace(whole, states=states))) as file:
         cell = drawn_cell.DrawnCell.of(file)
         figure = cell_picture.figure(cell)
         nodes = np.isin(cell.interface.nodes, np.flatnonzero(some)).any(axis=1)
@@ -149,3 +143,38 @@ def test_micrometres_have_the_micro_sign(given: str, shown: str) -> None:
     assert tables.with_micro(given) == shown
     assert plot_helpers.unit_label(given) == (f"({shown})" if given else "")
     assert tables.in_brackets(given) == (f" ({shown})" if given else "")
+
+
+@pytest.mark.parametrize("size", [(8.0, 80.0), (240.0, 10.0), (1.0, 1.0)])
+def test_bars_beside_narrow_and_flat_cells_are_wide_and_high_enough(size: tuple[float, float]) -> None:
+    attributes = {"width": size[0], "height": size[1], "length_unit": "um"}
+    figure, axes = figure_of(attributes)
+    axes.plot([0.0, size[0]], [0.0, size[1]])
+    bar = bar_beside(axes, ScalarMappable(), "both")
+    label_cell_axes(axes, attributes)
+    figure.draw_without_rendering()
+    drawn = bar.ax.get_window_extent().size / figure.dpi
+    assert drawn[0] > 0.12 and drawn[1] > 0.96  # inches
+
+
+@pytest.mark.parametrize("letters", [10, 200])
+def test_titles_wider_than_the_figure_are_drawn_whole(tmp_path: Path, letters: int) -> None:
+    figure = Figure(figsize=(3.0, 2.0), layout="constrained")
+    title = figure.subplots().set_title("M" * letters)
+    with Image.open(save(figure, tmp_path / "long.png")) as picture:
+        assert picture.width >= title.get_window_extent().width
+        assert (picture.width > 3.2 * DPI) == (letters == 200)
+        edges = np.asarray(picture)[:, [0, -1]]
+    assert (edges == 255).all()
+
+
+@pytest.mark.parametrize("panels", [1, 2, 4, 6])
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 20.0])
+def test_panels_leave_no_row_empty(panels: int, ratio: float) -> None:
+    rows, columns = deformed_panels._grid(panels, ratio)
+    assert (rows - 1) * columns < panels <= rows * columns
+
+
+def test_panels_and_frames_of_tall_cells_fit_on_a_page() -> None:
+    assert deformed_panels._inches(np.array([1.0, 1.0]), 3.6) == (3.6, 3.6)
+    assert deformed_panels._inches(np.array([8.0, 80.0]), 3.6) == pytest.approx((0.6, 6.0))

@@ -1,6 +1,5 @@
 """Pictures of a whole path: texts in the width of a column, and one colour range for all states."""
 
-import json
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -13,11 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from support.sample_output import Sample, sample
+from support.sample_output import sample, write
 
 from feti_homog.errors import CaseError
 from feti_homog.report.plots import deformed_panels, figures, plot_helpers
-from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
 
@@ -32,16 +30,6 @@ def path_of(strains: list[float]) -> dict[str, Any]:
     case |= {"interface": {"contact": True, "criterion": "max", "normal_strength": 0.06}}
     case |= {"path": {"strain": [1.0, 0.0, 0.0], "method": "events"}, "output": {"stress_unit": "GPa"}}
     return {"schema": SCHEMA, "case": case, "path": points}
-
-
-def write(directory: Path, whole: Sample, document: dict[str, Any]) -> None:
-    from mpi4py import MPI
-
-    *parts, states = vars(whole).values()
-    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
-        for k, state in enumerate(states):
-            file.write_state(k, state)
-    (directory / "result.json").write_text(json.dumps(document))
 
 
 def texts(figure: Figure) -> list[Text]:

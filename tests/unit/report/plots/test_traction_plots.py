@@ -8,24 +8,13 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from support.sample_output import Sample, sample
+from support.sample_output import Sample, sample, write
 
 from feti_homog.report.plots.cell_picture import write_fibre_numbers
 from feti_homog.report.plots.drawn_cell import DrawnCell
 from feti_homog.report.plots.traction_plots import Coordinate, _limit, coordinate
-from feti_homog.results.field_file import FieldFile
 
 CORNERS = np.array([[0.75, 0.25], [0.75, 0.75], [0.25, 0.75], [0.25, 0.25]])
-
-
-def write(directory: Path, whole: Sample) -> Path:
-    from mpi4py import MPI
-
-    *parts, states = vars(whole).values()
-    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
-        for k, state in enumerate(states):
-            file.write_state(k, state)
-    return directory / "result.h5"
 
 
 def around(whole: Sample, count: int, number: int) -> Sample:

@@ -47,14 +47,6 @@ def line(text: str, start: str) -> str:
     return next(line for line in text.splitlines() if line.strip().startswith(start))
 
 
-def test_the_summary_is_aligned_and_narrow() -> None:
-    lines = summary(DOCUMENT).splitlines()
-    assert max(map(len, lines)) < 80
-    assert all(text == text.rstrip() for text in lines)
-    matrix = [lines[i] for i in range(len(lines)) if lines[i].startswith(("Effective", "  S11", "  S22", "  S12"))]
-    assert len(matrix) == 4 and len({len(text) for text in matrix}) == 1
-
-
 def test_stiffnesses_in_space_are_narrow_and_say_what_temperature_does() -> None:
     C = [[161.25, 45.39, 40.33, 0, 0, -1e-9], [45.39, 161.26, 40.33, 0, 0, 0], [40.33, 40.33, 229.45, 0, 0, 0],
          [0, 0, 0, 54.26, 0, 0], [0, 0, 0, 0, 54.27, 0], [-1e-9, 0, 0, 0, 0, 46.05]]  # fmt: skip
@@ -100,12 +92,6 @@ def test_checks_beyond_the_tolerance_fail() -> None:
     assert line(summary(document), "jump").split() == ["jump", "3.0e-06"]
 
 
-def test_a_value_out_of_its_bounds_is_marked() -> None:
-    assert "outside" not in summary(DOCUMENT)
-    stiffness = [[170.0, 0.0, 0.0], [0.0, 150.0, 0.0], [0.0, 0.0, 45.0]]
-    assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
-
-
 def test_remarks_warnings_and_faults_are_reported_in_this_order() -> None:
     text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
     assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
@@ -121,14 +107,6 @@ def test_what_is_unknown_is_left_out() -> None:
     document["bounds"]["hashin_shtrikman"] = None
     text = summary(document)
     assert "GPa" not in text and "Hashin" not in text and "()" not in text
-
-
-@pytest.mark.parametrize("key", ["cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status"])
-def test_a_document_without_a_required_key_is_a_defect(key: str) -> None:
-    document = changed()
-    del document[key]
-    with pytest.raises(KeyError, match=key):
-        summary(document)
 
 
 def counted(bonded: int, **values: Any) -> dict[str, Any]:
@@ -277,14 +255,6 @@ def test_energy_release_rates_against_the_angle() -> None:
     lines = summary(bonding(angle=given)).splitlines()
     where = lines.index("Largest energy release rate (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]
-
-
-def test_checks_of_contact_are_those_of_interfaces() -> None:
-    document = changed()
-    document["checks"] |= {"kkt_tension": 0.0}
-    assert "kkt_tension" not in summary(document)
-    document["case"] |= {"interface": {"contact": True}}
-    assert "kkt_tension" in summary(document)
 
 
 def test_states_without_iterations_are_reported() -> None:

@@ -1,5 +1,7 @@
 """Ends of jobs in which ranks raise, together or alone."""
 
+import re
+
 import pytest
 
 PROGRAM = """
@@ -25,15 +27,13 @@ def run(mpirun, ranks, body):
     return mpirun(ranks, "-c", PROGRAM.format(body=body))
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_job_without_faults_ends_with_zero(mpirun, ranks):
-    assert run(mpirun, ranks, "pass").returncode == 0
+def test_a_job_without_faults_ends_with_zero(mpirun):
+    assert run(mpirun, 2, "pass").returncode == 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ranks", [1, 2, 4])
-def test_faults_of_all_ranks_are_reported_once(mpirun, ranks):
-    job = run(mpirun, ranks, "raise CaseError('[cell] one', '[cell] two')")
+def test_faults_of_all_ranks_are_reported_once(mpirun):
+    job = run(mpirun, 3, "raise CaseError('[cell] one', '[cell] two')")
     assert job.returncode == 2
     assert job.stderr.count("error: [cell] one\n") == job.stderr.count("error: [cell] two\n") == 1
     assert "Traceback" not in job.stderr
@@ -43,7 +43,7 @@ def test_faults_of_all_ranks_are_reported_once(mpirun, ranks):
 @pytest.mark.parametrize(
     ("body", "words", "code"),
     [
-        ("if comm.rank == comm.size - 1: raise KeyError('lost')", "KeyError: 'lost'", 1),
+        ("if comm.rank == comm.size - 1: raise KeyError('lost')", "rank 1 of 2:.*KeyError: 'lost'", 1),
         ("if comm.rank == comm.size - 1: raise ConvergenceError('stuck')", "error: stuck", 3),
         # Within what communicates: after it, which all hear, and before it, which the others would wait for.
         ("agree_after(comm, lambda: comm.barrier() or 1 // comm.rank)", "ZeroDivisionError", 1),
@@ -55,9 +55,4 @@ def test_faults_of_all_ranks_are_reported_once(mpirun, ranks):
 def test_a_rank_that_raises_alone_ends_the_job(mpirun, body, words, code):
     job = run(mpirun, 2, body)
     assert job.returncode == code
-    assert words in job.stderr
-
-
-def test_the_traceback_names_its_rank(mpirun):
-    job = run(mpirun, 2, "if comm.rank == 1: raise KeyError('lost')")
-    assert "rank 1 of 2:" in job.stderr
+    assert re.search(words, job.stderr, re.DOTALL)

@@ -1,12 +1,20 @@
-"""Schur complements by MUMPS and CHOLMOD against dense algebra; what MUMPS cannot make is no zeros."""
+"""Matrix algebra against NumPy: scaled and dense symmetric matrices, Schur complements by MUMPS and CHOLMOD."""
 
 import numpy as np
 import pytest
 from petsc4py import PETSc
-from scipy.sparse import block_diag, csr_matrix, diags, identity, kron
+from scipy.sparse import block_diag, csr_matrix, diags, identity, kron, random
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, schur_complement
+from feti_homog.feti.linalg.dense_matrices import (
+    condensed_with_loads,
+    full_from_lower,
+    invert_upper,
+    product_with_some,
+    schur_complement,
+)
+from feti_homog.feti.linalg.sparse_matrices import scaled
+from feti_homog.feti.thresholds import BLOCK_ROWS
 
 
 def laplacian(n: int) -> csr_matrix:
@@ -100,3 +108,56 @@ def test_a_singular_rest_is_no_lack_of_memory():
     A = csr_matrix(block_diag([laplacian(4), np.zeros((2, 2))]))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
         schur_complement(A, np.arange(3))
+
+
+SIZES = [1, 2, BLOCK_ROWS, BLOCK_ROWS + 1, 2 * BLOCK_ROWS, 2 * BLOCK_ROWS + 1, 203]
+
+
+def definite(n):
+    M = np.random.default_rng(n).standard_normal((n, n))
+    return np.asfortranarray(M @ M.T + n * np.eye(n))
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_the_inverse_takes_the_upper_triangle_alone(n):
+    A = definite(n)
+    both = A.copy(order="F")
+    invert_upper(both)
+    expected = np.linalg.inv(A)
+    assert np.abs(np.triu(both - expected)).max() < 1e-12 * np.abs(expected).max()
+    assert (np.tril(both, -1) == np.tril(A, -1)).all()
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_an_indefinite_matrix_is_refused(n):
+    A = definite(n)
+    A[n // 2, n // 2] = -1.0
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        invert_upper(A)
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_mirrored_is_symmetric_with_that_lower_triangle(n):
+    A = np.asfortranarray(np.random.default_rng(n).standard_normal((n, n)))
+    before = A.copy()
+    whole = full_from_lower(A)
+    assert (whole == whole.T).all() and (np.tril(whole) == np.tril(A)).all() and (before == A).all()
+
+
+def test_rows_and_columns_are_scaled():
+    A = random(7, 7, 0.4, "csr", random_state=1)
+    before, weights = A.toarray(), np.arange(1.0, 8.0)
+    found = scaled(A, weights)
+    assert np.allclose(found.toarray(), weights[:, None] * before * weights, rtol=1e-15)
+    assert not any(np.shares_memory(getattr(found, name), getattr(A, name)) for name in ("data", "indices", "indptr"))
+    assert np.array_equal(A.toarray(), before)
+
+
+@pytest.mark.parametrize(("some", "columns"), [(0, 3), (3, 1), (3, 900), (500, 40), (600, 900)])
+def test_product_with_some_columns(some, columns):
+    """By all columns, or by copies of those that count, in one part or in several."""
+    rng = np.random.default_rng(some)
+    matrix, at = np.asfortranarray(rng.normal(size=(30, 700))), rng.permutation(700)[:some]
+    x = rng.normal(size=(some, columns))
+    np.testing.assert_allclose(product_with_some(matrix, at, x), matrix[:, at] @ x, atol=1e-12)
+    np.testing.assert_allclose(product_with_some(matrix, at, x[:, 0]), matrix[:, at] @ x[:, 0], atol=1e-12)
