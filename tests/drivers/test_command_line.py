@@ -66,7 +66,7 @@ def test_run_writes_every_file_at_any_number_of_ranks(tmp_path, ranks):
 def test_conductivity_writes_its_files(tmp_path):
     case, out = tmp_path / "conductivity.toml", tmp_path / "results"
     case.write_text((ROOT / "drivers/conductivity.toml").read_text().replace("mesh_size = 0.08", "mesh_size = 0.2"))
-    job = command_line(2, "run", case, "--out", out)
+    job = in_process("run", case, "--out", out)
     assert job.returncode == 0, job.stderr
     pictures = {name for name in FILES if not name.startswith("case_")} | {"case_dT_dx1.png", "case_dT_dx2.png"}
     assert {path.name for path in out.iterdir()} == pictures
@@ -243,7 +243,7 @@ def test_keys_of_a_section():
 
 
 def test_keys_of_a_word_that_is_nowhere():
-    job = in_process("keys", "qwxz")
+    job = command_line(2, "keys", "qwxz")
     assert job.returncode == 2 and job.stderr.count("error: keys qwxz: no key, section or description has it; ") == 1
 
 

@@ -130,7 +130,7 @@ def test_a_study_whose_disk_is_full_goes_on(tmp_path, kind, name, call):
     assert json.loads((out / f"{kind}.json").read_text())["status"] == "done"
 
 
-@pytest.mark.parametrize(("first", "other"), [("sweep", "fit"), ("fit", "fit"), ("fit", "uncertainty")])
+@pytest.mark.parametrize(("first", "other"), [("sweep", "fit"), ("fit", "uncertainty")])
 def test_a_second_study_in_the_folder_of_another_ends_in_one_line(tmp_path, first, other):
     """The first one waits before its first result, and ends as if it were alone."""
     for name, text in STUDIES.items():

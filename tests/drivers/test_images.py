@@ -39,7 +39,8 @@ def test_faulty_images_and_lengths_are_refused_once(tmp_path):
 
 def test_the_image_of_labels_is_a_verified_cell(tmp_path):
     text = (ROOT / "drivers/labels.toml").read_text().replace("../meshes", str(ROOT / "meshes"))
-    (tmp_path / "labels.toml").write_text(text.replace("mesh_size = 0.03", "mesh_size = 0.1"))
+    text = text.replace("mesh_size = 0.03", "mesh_size = 0.1").replace("[output]", "[output]\npictures = false")
+    (tmp_path / "labels.toml").write_text(text)
     job = command_line(2, "run", tmp_path / "labels.toml", "--out", tmp_path / "out")
     assert job.returncode == 0 and "Cell        pixels, 40 x 40" in job.stdout, job.stderr
     assert command_line(0, "verify", tmp_path / "out").returncode == 0

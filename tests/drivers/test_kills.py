@@ -12,7 +12,7 @@ WRITE = "feti_homog.results.checkpoints:Checkpoint.write"
 COMMIT = "feti_homog.results.atomic:commit"
 WRITE_STATE = "feti_homog.results.field_file:FieldFile.write_state"
 # In the order in which a run comes to them, and how many events are kept then: all (None) when fields are written.
-MOMENTS = {"event 1": 1, "event 3": 3, "state 2": None, "result.h5": None, "result.json": None, "path.csv": None}
+MOMENTS = {"event 3": 3, "state 2": None, "result.h5": None, "result.json": None, "path.csv": None}
 
 
 def test_a_run_that_is_killed_while_it_writes_goes_on(tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support import events
 from support.base_case import with_lines
-from support.command_line import command_line, in_process
+from support.command_line import command_line, in_process, on_ranks
 from support.hooks import WAIT, Hook, HookedJob
 from support.small_path import SHEET_PATH
 
@@ -130,8 +130,7 @@ def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     assert in_process("run", case, "--out", tmp_path / "whole").returncode == 0
     softens = kind == "softening"
     count = killed(ranks, case, tmp_path / "out", 12 if softens else 8)
-    words = "run", case, "--out", tmp_path / "out", "--resume"
-    job = command_line(ranks, *words) if ranks else in_process(*words)
+    job = on_ranks(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found, expected = (document(tmp_path / name) for name in ("out", "whole"))
     kept = found["resumed"]
@@ -209,8 +208,7 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
         assert count == 1
     (tmp_path / "case.toml").write_text(text)
     kept = events.count(tmp_path / "out")
-    words = "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume"
-    job = command_line(ranks, *words) if ranks else in_process(*words)
+    job = on_ranks(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and message in job.stderr and "Traceback" not in job.stderr
     assert job.stderr.count("error: --resume:") == 1 and "coarse triangles" not in job.stdout  # before meshing
     assert events.count(tmp_path / "out") == kept

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from support.command_line import command_line, in_process
+from support.command_line import command_line, in_process, on_ranks
 from support.hooks import WAIT, Hook, HookedJob
 from support.jobs import PATIENCE, ROOT, launched
 from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, RANDOM, means, rows, sweep_file
@@ -63,17 +63,17 @@ def test_list_tells_cases_and_their_state(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("ranks", "words", "message"),
     [
-        ([], "arguments are required: --out"),
-        (["--out", "results/none", "--index", "3"], "--index 3: expected the number of a case, 1 to 2"),
-        (["--out", "results/none", "--index", "0"], "--index 0: expected the number of a case, 1 to 2"),
-        (["--out", "results/none", "--ranks-per-case", "2"], "--ranks-per-case 2: expected a divisor of the 1 ranks"),
-        (["--list", "--index", "1"], "not allowed with argument"),
+        (0, [], "arguments are required: --out"),
+        (2, ["--out", "results/none", "--index", "3"], "--index 3: expected the number of a case, 1 to 2"),
+        (0, ["--out", "results/none", "--index", "0"], "--index 0: expected the number of a case, 1 to 2"),
+        (2, ["--out", "results/none", "--ranks-per-case", "3"], "--ranks-per-case 3: expected a divisor of the 2 r"),
+        (0, ["--list", "--index", "1"], "not allowed with argument"),
     ],
 )
-def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, words, message):
-    job = in_process("sweep", sweep_file(tmp_path, TWO), *words)
+def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, ranks, words, message):
+    job = on_ranks(ranks, "sweep", sweep_file(tmp_path, TWO), *words)
     assert job.returncode == 2 and job.stderr.count(message) == 1
     assert not Path(ROOT / "results/none").exists()
 
@@ -94,7 +94,7 @@ def test_a_sweep_is_not_run_as_a_case_nor_a_case_as_a_sweep(tmp_path):
 
 
 def test_check_tells_cases_points_and_ranks(tmp_path):
-    job = in_process("check", sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
+    job = command_line(2, "check", sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
     assert job.returncode == 0 and "6 cases, 2 points" in job.stdout and "recommended: " in job.stdout
 
 

@@ -44,6 +44,11 @@ def in_process(*words: str | Path) -> CompletedProcess[str]:
     return CompletedProcess(words, code, output.getvalue(), errors.getvalue())
 
 
+def on_ranks(ranks: int, *words: str | Path) -> CompletedProcess[str]:
+    """Run `feti-homog words...` on so many ranks; none: in the process of the test."""
+    return command_line(ranks, *words) if ranks else in_process(*words)
+
+
 def assert_verified(*folders: Path) -> None:
     """Check that the results in these folders obey every law of `feti-homog verify`."""
     assert folders

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from support.command_line import command_line, in_process
+from support.command_line import in_process, on_ranks
 
 TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
 
@@ -19,8 +19,7 @@ def contents(out: Path) -> dict[Path, bytes]:
 
 def swept(out: Path, path: Path, *words: str, ranks: int = 0, code: int = 0):
     """Run a sweep on so many ranks; none: in the process of the test."""
-    words = ("sweep", path, "--out", out, *words)
-    job = command_line(ranks, *words) if ranks else in_process(*words)
+    job = on_ranks(ranks, "sweep", path, "--out", out, *words)
     assert job.returncode == code, job.stdout + job.stderr
     assert "Traceback" not in job.stderr
     return job
