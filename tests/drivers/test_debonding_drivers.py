@@ -15,7 +15,7 @@ BONDED, VOID = references.BONDED["hexagonal", "strain"].value, references.VOID["
 
 
 def test_stiffness_falls_with_the_angle_from_bonded_to_void(tmp_path):
-    rows = driven("debonding_angle", tmp_path, "--fields", ranks=2)
+    rows = driven("debonding_angle", tmp_path, "--fields", "--mesh-size", "0.12")
     assert column(rows, "angle").tolist() == [0.0, 90.0, 180.0, 270.0, 360.0]
     for entry in ("C11", "C22", "C33"):
         strain, fibres, stress = (
@@ -92,7 +92,7 @@ def composite_cylinders(case):
 
 
 def test_contact_prevents_overlap_and_stiffens(tmp_path):
-    free, contact = driven("deformed_cell", tmp_path, ranks=2)
+    free, contact = driven("deformed_cell", tmp_path, "--refine", "0", ranks=2)
     assert float(contact["S12"]) > float(free["S12"]) > 0.0
     assert int(free["closed"]) == 0 < int(contact["closed"])
     assert int(free["bonded"]) == int(contact["bonded"]) > 0
@@ -104,7 +104,7 @@ def test_contact_prevents_overlap_and_stiffens(tmp_path):
 def stress_strain(tmp_path_factory):
     """Provide the folder and the table of the driver of Figure 5, with the pictures of its cases."""
     folder = tmp_path_factory.mktemp("stress_strain")
-    return folder, driven("stress_strain", folder, "--pictures")
+    return folder, driven("stress_strain", folder, "--pictures", "--mesh-size", "0.08")
 
 
 def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(stress_strain):

@@ -1,11 +1,11 @@
-"""`feti-homog fibres` in processes of its own: a cell, its table, and the results of the table."""
+"""`feti-homog fibres`: a cell, its table, and the results of the table."""
 
 import json
 
 import numpy as np
 import pytest
 from support.base_case import BASE
-from support.command_line import command_line
+from support.command_line import command_line, in_process
 
 SQUARE = 'geometry = "square"\nfibre_fraction = 0.4\nmesh_size = 0.2\nwidth = 3.0\n'
 HEXAGONAL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05\n'
@@ -22,8 +22,8 @@ def test_a_cell_its_table_and_the_table_of_its_result(tmp_path):
         if name == "square":
             job = command_line(2, "fibres", case, "--out", tmp_path / "square.csv")
             assert (job.returncode, job.stdout, job.stderr) == (0, f"{tmp_path / 'square.csv'}\n", "")
-        assert command_line(0, "run", case, "--out", out, "--quiet").returncode == 0
-        job = command_line(2, "fibres", out)
+        assert in_process("run", case, "--out", out, "--quiet").returncode == 0
+        job = in_process("fibres", out)
         assert (job.returncode, job.stderr) == (0, "")
         printed = [line.split(",") for line in job.stdout.splitlines()[2:]]
         written = [line.split(",") for line in (tmp_path / "square.csv").read_text().splitlines()[2:]]

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from support.command_line import command_line
+from support.command_line import command_line, in_process
 from support.hooks import KILL, WAIT, Hook, HookedJob, hooked
 from support.jobs import ROOT, mpirun
 
@@ -34,7 +34,7 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     path, out = tmp_path / "fit.toml", tmp_path / "out"
     path.write_text(FIT)
     words = ("fit", path, "--out", out)
-    checked = command_line(0, "check", path)
+    checked = in_process("check", path)
     assert checked.stdout.startswith(
         "fit        1 unknowns, 1 measured values of 1 tests; the first at the start:\ncase "
     )
@@ -42,7 +42,7 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     second = "args[1].name == 'result.json' and args[1].parts[-3] == 'evaluation-0002'"
     with HookedJob(0, [Hook(COMMIT, WAIT, when=second)], *words) as job:
         assert job.reported() == "0 here"
-        refused = command_line(0, *words)
+        refused = in_process(*words)
         assert refused.returncode == 2 and "another run writes its results there" in refused.stderr
         assert f"process {job.process.pid}" in refused.stderr
         job.killed()
@@ -50,7 +50,7 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     assert len(results) == 1 and json.loads((out / "fit.json").read_text())["status"] == "running"
     job = hooked(0, [Hook(COMMIT, KILL, when="args[1].name == 'fit.json'")], *words, "--quiet")
     assert job.returncode not in (0, 2, 3) and json.loads((out / "fit.json").read_text())["status"] == "running"
-    job = command_line(0, *words)
+    job = in_process(*words)
     assert job.returncode == 0, job.stderr
     document = json.loads((out / "fit.json").read_text())
     found = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
@@ -88,7 +88,7 @@ def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):
     path, out = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(FIT.partition("[unknown]")[0].replace("0.4", "{mean = 0.4, std = 0.02}"))
     words = ("uncertainty", path, "--out", out, "--ranks-per-case", "1")
-    checked = command_line(0, "check", path)
+    checked = in_process("check", path)
     assert checked.returncode == 0 and checked.stdout.startswith("scatter    1 uncertain numbers"), checked.stderr
     job = hooked(2, [Hook(COMMIT, KILL, when="args[1].parts[-2] == 'case-0001'")], *words)
     assert job.returncode not in (0, 2, 3) and json.loads((out / "uncertainty.json").read_text())["status"] == "running"
@@ -96,7 +96,7 @@ def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):
     assert job.returncode == 0 and "By differences of runs: none" in job.stdout, job.stderr
     assert json.loads((out / "uncertainty.json").read_text())["status"] == "done"
     (out / "uncertainty.json").write_text("{}")
-    job = command_line(0, *words)
+    job = in_process(*words)
     assert job.returncode == 2 and (out / "uncertainty.json").read_text() == "{}"
 
 
@@ -124,13 +124,13 @@ def test_a_study_whose_disk_is_full_goes_on(tmp_path, kind, name, call):
     assert name in faults[0] and "Traceback" not in job.stderr and not list(out.rglob("*.part"))
     results = {each: each.stat().st_mtime_ns for each in out.rglob("case-*/result.json")}
     assert bool(results) == (name != "sweep.json" and (kind, name) != ("uncertainty", "result.json"))
-    again = command_line(0, kind, path, "--out", out)
+    again = in_process(kind, path, "--out", out)
     assert again.returncode == 0, again.stderr
     assert results.items() <= {each: each.stat().st_mtime_ns for each in out.rglob("case-*/result.json")}.items()
     assert json.loads((out / f"{kind}.json").read_text())["status"] == "done"
 
 
-@pytest.mark.parametrize(("first", "other"), [("sweep", "fit"), ("fit", "fit"), ("fit", "uncertainty")])
+@pytest.mark.parametrize(("first", "other"), [("sweep", "fit"), ("fit", "uncertainty")])
 def test_a_second_study_in_the_folder_of_another_ends_in_one_line(tmp_path, first, other):
     """The first one waits before its first result, and ends as if it were alone."""
     for name, text in STUDIES.items():
@@ -140,7 +140,7 @@ def test_a_second_study_in_the_folder_of_another_ends_in_one_line(tmp_path, firs
     with HookedJob(0, [wait], first, tmp_path / f"{first}.toml", "--out", out) as job:
         assert job.reported() == "0 here"
         before = {each: each.stat().st_mtime_ns for each in out.rglob("*")}
-        refused = command_line(0, other, tmp_path / f"{other}.toml", "--out", out)
+        refused = in_process(other, tmp_path / f"{other}.toml", "--out", out)
         assert refused.returncode == 2 and refused.stderr.startswith("error: ") and refused.stderr.count("\n") == 1
         assert {each: each.stat().st_mtime_ns for each in out.rglob("*")} == before
         job.release()

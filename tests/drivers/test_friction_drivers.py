@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from support.base_case import with_lines
-from support.command_line import command_line
+from support.command_line import in_process
 from support.drivers import column, driven
 from support.hooks import WAIT, Hook, HookedJob
 from support.small_path import SHEET_PATH
@@ -43,12 +43,12 @@ def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path, meth
     steps = 'method = "increments"\nincrements = 20\n' if method == "increments" else ""
     (tmp_path / "case.toml").write_text(CYCLES.replace("[output]", f"{steps}[output]"))
     words = ("run", tmp_path / "case.toml", "--out")
-    assert command_line(1, *words, tmp_path / "whole").returncode == 0
+    assert in_process(*words, tmp_path / "whole").returncode == 0
     there = Hook("feti_homog.results.checkpoints:Checkpoint.write", WAIT, when=f"args[1] == {kept - 1}", after=True)
-    with HookedJob(1, [there], *words, tmp_path / "out") as job:
+    with HookedJob(0, [there], *words, tmp_path / "out") as job:
         assert job.reported() == "0 here"
         job.killed()
-    assert command_line(1, *words, tmp_path / "out", "--resume").returncode == 0
+    assert in_process(*words, tmp_path / "out", "--resume").returncode == 0
     found, whole = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("out", "whole"))
     last = whole["path"][found["resumed"] - 1]
     assert found["resumed"] == kept and 0.5 < last["load_factor"] < 0.75 and last["broke"] == 0

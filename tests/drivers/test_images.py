@@ -1,11 +1,11 @@
-"""Images in processes of their own: the fibres of a micrograph as a table and a picture, labels as a cell."""
+"""Images by the command line: the fibres of a micrograph as a table and a picture, labels as a cell."""
 
 from pathlib import Path
 
 import numpy as np
 from matplotlib.image import imread
 from support.base_case import BASE
-from support.command_line import command_line
+from support.command_line import command_line, in_process
 from support.label_images import CIRCLES, labels_of, write_png
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ def test_fibres_of_a_micrograph_become_a_table_a_picture_and_a_cell(tmp_path):
     assert np.abs(np.subtract(found, known)).max() < 0.5 / 120
     cell = 'geometry = "table"\nfile = "fibres.csv"\nwindow = "cut"\nmesh_size = 0.2\n'
     (tmp_path / "case.toml").write_text(BASE.replace(HEXAGONAL, cell) + "[output]\npictures = false\n")
-    job = command_line(0, "run", tmp_path / "case.toml", "--out", tmp_path / "out")
+    job = in_process("run", tmp_path / "case.toml", "--out", tmp_path / "out")
     assert job.returncode == 0 and "Status      done" in job.stdout, job.stderr
 
 
@@ -32,14 +32,15 @@ def test_faulty_images_and_lengths_are_refused_once(tmp_path):
     (tmp_path / "a.png").write_bytes(b"no image")
     job = command_line(2, "fibres", "--image", tmp_path / "a.png", "--out", tmp_path / "a.csv")
     assert (job.returncode, job.stdout) == (2, "") and job.stderr.count("error:") == 1 and "a.png" in job.stderr
-    job = command_line(0, "fibres", "--image", tmp_path / "a.png", "--pixel", "-1")
+    job = in_process("fibres", "--image", tmp_path / "a.png", "--pixel", "-1")
     assert job.returncode == 2 and "expected a length above 0, such as 0.5" in job.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"a.png"}
 
 
 def test_the_image_of_labels_is_a_verified_cell(tmp_path):
     text = (ROOT / "drivers/labels.toml").read_text().replace("../meshes", str(ROOT / "meshes"))
-    (tmp_path / "labels.toml").write_text(text.replace("mesh_size = 0.03", "mesh_size = 0.1"))
+    text = text.replace("mesh_size = 0.03", "mesh_size = 0.1").replace("[output]", "[output]\npictures = false")
+    (tmp_path / "labels.toml").write_text(text)
     job = command_line(2, "run", tmp_path / "labels.toml", "--out", tmp_path / "out")
     assert job.returncode == 0 and "Cell        pixels, 40 x 40" in job.stdout, job.stderr
     assert command_line(0, "verify", tmp_path / "out").returncode == 0

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from support.command_line import case_file, command_line
+from support.command_line import case_file, command_line, in_process
 from support.hooks import Hook, hooked
 
 from feti_homog.system.petsc.option_table import OPTIONS
@@ -21,7 +21,7 @@ VALUES = {"<real>": "1e-8", "<integer>": "50", "": None}
 def stiffness(tmp_path_factory):
     """L^ef with the default options."""
     folder = tmp_path_factory.mktemp("default")
-    job = command_line(1, "run", case_file(folder, CUT), "--out", folder / "out", "--quiet")
+    job = in_process("run", case_file(folder, CUT), "--out", folder / "out", "--quiet")
     assert job.returncode == 0, job.stderr
     return np.array(json.loads((folder / "out/result.json").read_text())["effective_stiffness"])
 
@@ -140,30 +140,29 @@ def test_misspelt_options_of_a_case_file_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("ranks", "options"),
     [
-        ["-log_view ascii:none/", "-feti_ksp_monitor ascii:none/", "-info none/", "-malloc_view none/",
+        (2, ["-log_view ascii:none/", "-feti_ksp_monitor ascii:none/", "-info none/", "-malloc_view none/",
          "-malloc_test maybe", "-feti_natural_ksp_rtol 2", "-skip_petscrc maybe", "-log_vieww", "-mat_type foo",
-         "-prefix_push a"],
-        ["-log_view :none/", "-options_file pyproject.toml"],
+         "-prefix_push a"]),
+        (0, ["-log_view :none/", "-options_file pyproject.toml"]),
     ],
     ids=["values and names", "files"],
 )  # fmt: skip
-def test_options_that_nobody_could_take_are_a_line_each(tmp_path, options):
-    job = command_line(2, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words_of(options))
+def test_options_that_nobody_could_take_are_a_line_each(tmp_path, ranks, options):
+    job = command_line(ranks, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words_of(options))
     assert job.returncode == 2 and not (tmp_path / "out").exists()
     lines = [line for line in job.stderr.splitlines() if line.startswith("error: ")]
     assert sorted(line.split()[1].rstrip(":") for line in lines) == sorted(option.split()[0] for option in options)
     assert "PETSC ERROR" not in job.stderr
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path, ranks):
+def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path):
     """Its folder goes when pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
     case, log, out = case_file(tmp_path, ""), tmp_path / "logs", tmp_path / "out"
     log.mkdir()
     hook = Hook("feti_homog.report.plots.figures:plot", f"os.rmdir({str(log)!r})")
-    job = hooked(ranks, [hook], "run", case, "--out", out, "-log_view", f":{log}/log.txt")
+    job = hooked(2, [hook], "run", case, "--out", out, "-log_view", f":{log}/log.txt")
     assert job.returncode == 1 and "error: PETSc cannot end" in job.stderr
     assert json.loads((out / "result.json").read_text())["status"] == "done"
 

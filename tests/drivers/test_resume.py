@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support import events
 from support.base_case import with_lines
-from support.command_line import command_line
+from support.command_line import command_line, in_process, on_ranks
 from support.hooks import WAIT, Hook, HookedJob
 from support.small_path import SHEET_PATH
 
@@ -91,7 +91,7 @@ def assert_same_curve(found, expected):
 def reference(tmp_path_factory):
     """Provide the uninterrupted run."""
     folder = tmp_path_factory.mktemp("reference")
-    job = command_line(2, "run", case_file(folder), "--out", folder / "out")
+    job = in_process("run", case_file(folder), "--out", folder / "out")
     assert job.returncode == 0, job.stderr
     return folder / "out"
 
@@ -100,14 +100,12 @@ def reference(tmp_path_factory):
 def interrupted(tmp_path_factory):
     """Provide a folder with some events of an ended run."""
     folder = tmp_path_factory.mktemp("interrupted")
-    assert killed(2, case_file(folder), folder / "out", 5) == 5
+    assert killed(0, case_file(folder), folder / "out", 5) == 5
     return folder / "out"
 
 
-# Jobs of many short solves on more ranks than cores wait for each other: one of each pair has a single rank.
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, reference, ranks):
-    chance, case, out = random.Random(ranks), case_file(tmp_path), tmp_path / "out"
+def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, reference):
+    ranks, chance, case, out = 2, random.Random(2), case_file(tmp_path), tmp_path / "out"
     expected, last = document(reference), 0
     for moment in ("kept", "written", "computed"):
         last += chance.randint(1, 12)
@@ -126,13 +124,13 @@ def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, refer
     assert not (out / "checkpoint").exists()
 
 
-@pytest.mark.parametrize(("ranks", "kind"), [(2, "increments"), (1, "later legs"), (1, "softening")])
+@pytest.mark.parametrize(("ranks", "kind"), [(2, "increments"), (0, "later legs"), (0, "softening")])
 def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     case = case_file(tmp_path, **KINDS[kind])
-    assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
+    assert in_process("run", case, "--out", tmp_path / "whole").returncode == 0
     softens = kind == "softening"
     count = killed(ranks, case, tmp_path / "out", 12 if softens else 8)
-    job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
+    job = on_ranks(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found, expected = (document(tmp_path / name) for name in ("out", "whole"))
     kept = found["resumed"]
@@ -148,12 +146,12 @@ def test_a_cooled_path_in_space_resumes(tmp_path):
     """Killed on its first leg beyond the cooling, where bonds break by energy, faces touch, and stresses are given."""
     case = tmp_path / "case.toml"
     case.write_text(COOLED)
-    job = command_line(1, "run", case, "--out", tmp_path / "whole")
+    job = in_process("run", case, "--out", tmp_path / "whole")
     assert job.returncode == 0, job.stderr
     expected = document(tmp_path / "whole")["path"]
-    kept = killed(1, case, tmp_path / "out", len(expected) // 2)
+    kept = killed(0, case, tmp_path / "out", len(expected) // 2)
     assert expected[kept - 1]["load_factor"] > 0.34 and kept < len(expected)
-    job = command_line(1, "run", case, "--out", tmp_path / "out", "--resume")
+    job = in_process("run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found = document(tmp_path / "out")
     assert found["resumed"] == kept
@@ -166,7 +164,7 @@ def test_a_cooled_path_in_space_resumes(tmp_path):
 
 def test_a_finished_run_is_left_alone(tmp_path, reference):
     before = {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
-    job = command_line(2, "run", case_file(tmp_path, name="again"), "--out", reference, "--resume")
+    job = in_process("run", case_file(tmp_path, name="again"), "--out", reference, "--resume")
     assert job.returncode == 0 and "nothing to do" in job.stdout
     assert before == {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
 
@@ -183,10 +181,10 @@ def test_an_interrupted_path_says_what_is_kept(tmp_path):
 
 def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     coarse = case_file(tmp_path, name="coarse", mesh_size="mesh_size = 0.2")
-    job = command_line(2, "run", coarse, "--out", tmp_path / "new", "--resume")
+    job = in_process("run", coarse, "--out", tmp_path / "new", "--resume")
     assert job.returncode == 0 and "there is no checkpoint" in job.stdout
     shutil.copytree(interrupted, out := tmp_path / "old")
-    job = command_line(2, "run", case_file(tmp_path), "--out", out)
+    job = in_process("run", case_file(tmp_path), "--out", out)
     way = f"--resume goes on from them; remove {out / 'checkpoint'} to start again"
     assert job.returncode == 2 and f"error: --out {out}: it holds 5 events of this path: {way}\n" in job.stderr
     before, after = ({path.relative_to(of) for path in of.rglob("*")} for of in (interrupted, out))
@@ -196,10 +194,10 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
 @pytest.mark.parametrize(
     ("ranks", "changes", "message"),
     [
-        (2, {"normal_strength": "normal_strength = 4.1"}, "differs in interface.normal_strength: 4.0 now 4.1; choose"),
-        (2, {"refine": "refine = 1"}, "differs in cell.refine: 0 now 1; choose"),
-        (1, {}, "of a run on 2 ranks; go on with as many, or choose"),
-        (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "decomposition.subdomains: "),
+        (0, {"normal_strength": "normal_strength = 4.1"}, "differs in interface.normal_strength: 4.0 now 4.1; choose"),
+        (0, {"refine": "refine = 1"}, "differs in cell.refine: 0 now 1; choose"),
+        (2, {}, "of a run on 1 ranks; go on with as many, or choose"),
+        (0, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "decomposition.subdomains: "),
     ],
 )
 def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, changes, message):
@@ -210,7 +208,7 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
         assert count == 1
     (tmp_path / "case.toml").write_text(text)
     kept = events.count(tmp_path / "out")
-    job = command_line(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
+    job = on_ranks(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and message in job.stderr and "Traceback" not in job.stderr
     assert job.stderr.count("error: --resume:") == 1 and "coarse triangles" not in job.stdout  # before meshing
     assert events.count(tmp_path / "out") == kept
@@ -225,10 +223,10 @@ def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
     (tmp_path / "case.toml").write_text(own.replace("[path]\n", "[path]\nmax_events = 2\n"))
     words = ("run", tmp_path / "case.toml", "--out", tmp_path / "out")
     shutil.copy(meshes / "square.msh", mesh)
-    command_line(2, *words)
+    in_process(*words)
     kept = events.count(tmp_path / "out")
     shutil.copy(meshes / "two_fibres.msh", mesh)
-    job = command_line(2, *words, "--resume")
+    job = in_process(*words, "--resume")
     assert kept > 0 and job.returncode == 2 and "holds the events of another" in job.stderr
     assert "Traceback" not in job.stderr and events.count(tmp_path / "out") == kept
 
@@ -242,7 +240,7 @@ def test_unreadable_checkpoints_are_refused(tmp_path, interrupted, damage):
     else:
         content = path.read_bytes()
         path.write_bytes(content[:1000] + bytes(100) + content[1100:])
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "out", "--resume")
+    job = in_process("run", case_file(tmp_path), "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and "--resume: " in job.stderr and "checkpoint/events is damaged" in job.stderr
     assert "Traceback" not in job.stderr
 
@@ -250,5 +248,5 @@ def test_unreadable_checkpoints_are_refused(tmp_path, interrupted, damage):
 def test_only_paths_resume(tmp_path):
     from support.command_line import case_file as stiffness_case
 
-    job = command_line(1, "run", stiffness_case(tmp_path), "--out", tmp_path / "out", "--resume")
+    job = in_process("run", stiffness_case(tmp_path), "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and '--resume: only for [analysis] type = "path"' in job.stderr

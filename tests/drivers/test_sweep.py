@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from support.command_line import command_line
+from support.command_line import command_line, in_process, on_ranks
 from support.hooks import WAIT, Hook, HookedJob
 from support.jobs import PATIENCE, ROOT, launched
 from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, RANDOM, means, rows, sweep_file
@@ -38,13 +38,13 @@ def test_a_sweep_writes_every_case_at_any_number_of_ranks(tmp_path, ranks, words
     assert case["cell"] == document["case"]["cell"] and case["material"] == document["case"]["material"]
     assert (out / "cases.csv").read_text().splitlines()[2] == "2,case-0002,2,1,0.3"
     before = results(out)
-    swept(out, sweep_file(tmp_path, TWO), *words, ranks=ranks)
+    swept(out, sweep_file(tmp_path, TWO))
     assert results(out) == before
 
 
 def test_the_case_files_run_by_themselves(tmp_path):
     swept(tmp_path / "out", sweep_file(tmp_path, TWO))
-    job = command_line(1, "run", tmp_path / "out/case-0002/case.toml", "--out", tmp_path / "single")
+    job = in_process("run", tmp_path / "out/case-0002/case.toml", "--out", tmp_path / "single")
     assert job.returncode == 0, job.stderr
     found = [json.loads((f / "result.json").read_text()) for f in (tmp_path / "out/case-0002", tmp_path / "single")]
     assert found[0]["effective_stiffness"] == found[1]["effective_stiffness"]
@@ -57,40 +57,39 @@ def test_list_tells_cases_and_their_state(tmp_path):
         f"case-000{k}  cell.fibre_fraction = 0.{k + 1}, material.matrix.young = 80.0 GPa" for k in (1, 2)
     ]
     swept(out, path, "--index", "2")
-    job = command_line(0, "sweep", path, "--out", out, "--list")
+    job = in_process("sweep", path, "--out", out, "--list")
     assert [line.split()[1] for line in job.stdout.splitlines()] == ["waiting", "done"]
     assert len(list(tmp_path.glob("**/result.json"))) == 1
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("ranks", "words", "message"),
     [
-        ([], "arguments are required: --out"),
-        (["--out", "results/none", "--index", "3"], "--index 3: expected the number of a case, 1 to 2"),
-        (["--out", "results/none", "--index", "0"], "--index 0: expected the number of a case, 1 to 2"),
-        (["--out", "results/none", "--ranks-per-case", "3"], "--ranks-per-case 3: expected a divisor of the 2 ranks"),
-        (["--list", "--index", "1"], "not allowed with argument"),
+        (0, [], "arguments are required: --out"),
+        (2, ["--out", "results/none", "--index", "3"], "--index 3: expected the number of a case, 1 to 2"),
+        (0, ["--out", "results/none", "--index", "0"], "--index 0: expected the number of a case, 1 to 2"),
+        (2, ["--out", "results/none", "--ranks-per-case", "3"], "--ranks-per-case 3: expected a divisor of the 2 r"),
+        (0, ["--list", "--index", "1"], "not allowed with argument"),
     ],
 )
-def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, words, message):
-    job = command_line(2, "sweep", sweep_file(tmp_path, TWO), *words)
+def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, ranks, words, message):
+    job = on_ranks(ranks, "sweep", sweep_file(tmp_path, TWO), *words)
     assert job.returncode == 2 and job.stderr.count(message) == 1
     assert not Path(ROOT / "results/none").exists()
 
 
 def test_faults_of_all_points_are_reported_before_anything_runs(tmp_path):
     path = sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.95, 0.99]\n")
-    for words in (["sweep", path, "--out", tmp_path / "out"], ["check", path]):
-        job = command_line(2, *words)
+    for job in (command_line(2, "sweep", path, "--out", tmp_path / "out"), in_process("check", path)):
         assert job.returncode == 2 and not (tmp_path / "out").exists()
         faults = [line for line in job.stderr.splitlines() if line.startswith("error: ")]
         assert [line.split(":")[1].strip() for line in faults] == ["case-0002", "case-0003"]
 
 
 def test_a_sweep_is_not_run_as_a_case_nor_a_case_as_a_sweep(tmp_path):
-    job = command_line(1, "run", sweep_file(tmp_path, TWO), "--out", tmp_path / "out")
+    job = in_process("run", sweep_file(tmp_path, TWO), "--out", tmp_path / "out")
     assert job.returncode == 2 and "`feti-homog sweep` runs them" in job.stderr
-    job = command_line(1, "sweep", sweep_file(tmp_path, ""), "--out", tmp_path / "out")
+    job = in_process("sweep", sweep_file(tmp_path, ""), "--out", tmp_path / "out")
     assert job.returncode == 2 and "`feti-homog run` runs a single case" in job.stderr
 
 
@@ -107,11 +106,11 @@ def test_failed_cases_are_kept_and_reported(tmp_path):
     assert sorted(results(out)) == ["case-0001/result.json", "case-0003/result.json"]
     assert (out / "case-0002/error.txt").read_text().startswith("MeshError: ")
     before, failed = results(out), (out / "case-0002/error.txt").stat().st_mtime_ns
-    swept(out, path, ranks=ranks, code=3)
+    swept(out, path, code=3)
     assert (out / "case-0002/error.txt").stat().st_mtime_ns == failed
     swept(out, path, "--retry", "--ranks-per-case", "1", ranks=ranks, code=3)
     assert (out / "case-0002/error.txt").stat().st_mtime_ns > failed and results(out) == before
-    job = swept(out, path, "--index", "2", ranks=ranks, code=3)
+    job = swept(out, path, "--index", "2", code=3)
     assert "it failed before" in job.stderr
     assert "2 done, 1 failed" in collected(out).stdout
     assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"]
@@ -119,7 +118,7 @@ def test_failed_cases_are_kept_and_reported(tmp_path):
 
 def test_cases_without_convergence_are_computed_again_by_retry_only(tmp_path):
     out, path = tmp_path / "out", sweep_file(tmp_path, TWO, CASE + BY_BODIES)
-    job = swept(out, path, "-feti_ksp_max_it", "2", code=3)
+    job = swept(out, path, "-feti_ksp_max_it", "2", ranks=1, code=3)
     assert job.stdout.count("no convergence after 2 iterations") >= 2
     collected(out)
     assert [row["status"] for row in rows(out)][:2] == ["not converged"] * 2
@@ -158,7 +157,7 @@ def test_a_second_sweep_in_the_folder_is_refused_while_the_first_runs(tmp_path):
         first.reported()
         kept = results(out)
         for words in ([], ["--index", "2"]):
-            job = command_line(1, "sweep", path, "--out", out, *words)
+            job = in_process("sweep", path, "--out", out, *words)
             assert job.returncode == 2 and "this sweep is being run by" in job.stderr
             assert f"process {first.process.pid}" in job.stderr
         assert results(out) == kept and len(kept) == 1
@@ -210,7 +209,7 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
 
 
 def test_collect_needs_the_folder_of_a_sweep(tmp_path):
-    job = command_line(1, "collect", tmp_path)
+    job = in_process("collect", tmp_path)
     assert job.returncode == 2 and "expected the folder of a sweep" in job.stderr
 
 

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from support.command_line import command_line
+from support.command_line import command_line, in_process
 from support.jobs import PATIENCE, ROOT, RUN_VARIABLES, mpirun
 from support.sweep_files import rows, sweep_file
 from support.sweep_runs import TWO, collected, results, swept
@@ -47,7 +47,7 @@ def test_a_damaged_list_of_cases_is_reported(tmp_path):
     swept(out, path)
     (out / "sweep.json").write_text('{"cases": [')
     for words in (["sweep", path, "--out", out], ["collect", out]):
-        job = command_line(1, *words)
+        job = in_process(*words)
         assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
     assert len(results(out)) == 2
 
@@ -59,11 +59,10 @@ def test_a_damaged_list_of_cases_is_reported(tmp_path):
         ('"cell.order" = [1, 2]\n[petsc]\nfeti_ksp_rtoll = 1e-3', "case-0001, case-0002: -feti_ksp_rtoll: no solver"),
     ],
 )
-@pytest.mark.parametrize("words", [[], ["--index", "1"]], ids=["all", "one"])
-def test_faulty_options_are_reported_before_anything_is_written(tmp_path, lines, fault, words):
-    out = tmp_path / "out"
-    job = command_line(2, "sweep", sweep_file(tmp_path, f"{lines}\n"), "--out", out, *words)
-    assert job.returncode == 2 and job.stderr.startswith(f"error: {fault}") and not out.exists()
+def test_faulty_options_are_reported_before_anything_is_written(tmp_path, lines, fault):
+    words = "sweep", sweep_file(tmp_path, f"{lines}\n"), "--out", (out := tmp_path / "out")
+    for job in (command_line(2, *words), in_process(*words, "--index", "1")):
+        assert job.returncode == 2 and job.stderr.startswith(f"error: {fault}") and not out.exists()
 
 
 @pytest.mark.parametrize("limit", [1500, 200])

@@ -1,7 +1,12 @@
 """Runs of the command line for the tests of it."""
 
+import signal
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from subprocess import CompletedProcess
 
+from feti_homog import cli
 from feti_homog.verify.certificate import verify
 from support.base_case import BASE
 from support.jobs import mpirun
@@ -20,6 +25,28 @@ def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
 def command_line(ranks: int, *words: str | Path):
     """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
     return mpirun(ranks, *COMMAND, *words)
+
+
+def in_process(*words: str | Path) -> CompletedProcess[str]:
+    """Run `feti-homog words...` in the process of the test, which has one rank.
+
+    Options of PETSc, which starts once in a process, and tests of the process itself need `command_line`.
+    """
+    output, errors = StringIO(), StringIO()
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())  # programs that a test starts later would inherit more
+    try:
+        with redirect_stdout(output), redirect_stderr(errors):
+            code = cli.main([str(word) for word in words])
+    except SystemExit as end:
+        code = int(str(end.code or 0))
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+    return CompletedProcess(words, code, output.getvalue(), errors.getvalue())
+
+
+def on_ranks(ranks: int, *words: str | Path) -> CompletedProcess[str]:
+    """Run `feti-homog words...` on so many ranks; none: in the process of the test."""
+    return command_line(ranks, *words) if ranks else in_process(*words)
 
 
 def assert_verified(*folders: Path) -> None:

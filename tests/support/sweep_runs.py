@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from support.command_line import command_line
+from support.command_line import in_process, on_ranks
 
 TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
 
@@ -17,14 +17,15 @@ def contents(out: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and "lock" not in path.name}
 
 
-def swept(out: Path, path: Path, *words: str, ranks: int = 1, code: int = 0):
-    job = command_line(ranks, "sweep", path, "--out", out, *words)
+def swept(out: Path, path: Path, *words: str, ranks: int = 0, code: int = 0):
+    """Run a sweep on so many ranks; none: in the process of the test."""
+    job = on_ranks(ranks, "sweep", path, "--out", out, *words)
     assert job.returncode == code, job.stdout + job.stderr
     assert "Traceback" not in job.stderr
     return job
 
 
 def collected(out: Path):
-    job = command_line(0, "collect", out)
+    job = in_process("collect", out)
     assert job.returncode == 0, job.stderr
     return job
