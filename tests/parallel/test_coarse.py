@@ -9,7 +9,7 @@ from reference import dense_feti
 from scipy.linalg import eigh
 from support import torn_cells
 from support.cases import FIBRE, MATRIX, relative_error, solve
-from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, solve_many
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, agree, masks, of_all, solve_many
 
 from feti_homog.case import cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
@@ -113,18 +113,6 @@ def test_balancing_bounds_the_spectrum(narrow):
     assert least > 1 - 1e-8
     assert largest < BOUND / THRESHOLD
     assert natural > 20 * largest
-
-
-def test_threshold_trades_vectors_for_conditioning(narrow):
-    found = []
-    for threshold in (0.03, THRESHOLD, 0.5):
-        cell = narrow if threshold == THRESHOLD else Narrow(threshold, narrow.dense)
-        assert cell.coarse.threshold == threshold
-        largest = dense_feti.extreme_eigenvalues(cell.dense.F, cell.H)[1]
-        assert largest < BOUND / threshold
-        found.append((cell.solver.coarse_dimension, -largest))
-    assert found == sorted(found)
-    assert found[0][0] < found[1][0] < found[2][0]
 
 
 def test_all_modes_make_the_exact_inverse(comm):

@@ -111,17 +111,6 @@ def test_an_accuracy_counts_free_faces_of_voids():
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
-    """The void has the inner radius of the tube, on another mesh."""
-    keys = {"mesh_size": 0.05, "order": order, "refine": 1}
-    tube = solved(comm, table([ROWS[1] | {"radius": 0.3, "inner_radius": 0.2}], **keys), material=TWICE)
-    hole = solved(comm, table([ROWS[1] | {"phase": "void"}], **keys), fibre=False)
-    assert tube.cell.porosity == pytest.approx(hole.cell.porosity, rel=1e-3)
-    assert relative_error(tube.effective_stiffness, hole.effective_stiffness) < {1: 4e-3, 2: 1e-4}[order]
-
-
-@pytest.mark.one_rank
 def test_hollow_fibres_have_the_monolithic_stiffness(comm):
     rows = [VOID, ROWS[1] | {"inner_radius": 0.15}, {"x": 0.0, "y": 0.5, "radius": 0.15, "inner_radius": 0.05}]
     for pieces in ({}, {"decomposition": {"subdomains": 6}}):
