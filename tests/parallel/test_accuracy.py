@@ -89,7 +89,7 @@ def test_bonded_cells_against_their_series(geometry, plane, accuracy):
             assert energy_error(stiffness(cell, COMPOSITE, plane).effective_stiffness, exact) < accuracy
 
 
-@pytest.mark.parametrize(("geometry", "order"), zip(VOID, ACCURACIES, strict=True))
+@pytest.mark.parametrize(("geometry", "order"), [*zip(VOID, ACCURACIES, strict=True)])
 def test_cells_of_free_faces_against_their_series(geometry, order):
     exact = cubic(*VOID[geometry].value)
     cell = {"geometry": geometry, "fibre_fraction": 0.4, "accuracy": ACCURACIES[order], "order": order}
@@ -98,7 +98,7 @@ def test_cells_of_free_faces_against_their_series(geometry, order):
     assert energy_error(found, exact) < ACCURACIES[order]
 
 
-@pytest.mark.parametrize(("key", "order"), zip(ELASTIC, (1, 2, 1, 2, 1), strict=False))
+@pytest.mark.parametrize(("key", "order"), [*zip(ELASTIC, (1, 2, 1, 2, 1), strict=True)])
 def test_elastic_interfaces_against_their_series(key, order):
     geometry, k_n, k_t = key
     cell = {"geometry": geometry, "fibre_fraction": 0.4, "accuracy": ACCURACIES[order], "order": order}

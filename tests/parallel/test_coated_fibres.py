@@ -75,7 +75,7 @@ def test_soft_coatings_tend_to_elastic_interfaces():
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("young", [3e-3, 3.0, 3e3])
+@pytest.mark.parametrize("young", [3e-3, 3e3])
 def test_thin_coatings_take_few_iterations(young):
     cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
     result = result_of((young, 0.3), 0.01, **cell)
