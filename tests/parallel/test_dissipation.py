@@ -96,8 +96,7 @@ def test_events_dissipate_the_work_that_is_not_stored(straight, case, contact, w
     assert (np.diff(found, axis=0) >= 0).all() and (found[:, 1] >= found[:, 0]).all()
 
 
-@pytest.mark.parametrize("contact", [True, False])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(("case", "contact"), [("three", True), ("square", False)])
 def test_rising_strain_dissipates_the_area_under_its_curve(straight, case, contact):
     """At a load t the branch is that of the first point at t or more: the area under it, less what is stored."""
     cell, points = straight(case, contact)
@@ -105,10 +104,10 @@ def test_rising_strain_dissipates_the_area_under_its_curve(straight, case, conta
     records = np.flatnonzero(loads >= np.maximum.accumulate(loads))
     slopes = np.array([STRAIGHT @ torn_cells.stress(cell, points[k].state.solution) for k in records])
     area = 0.5 * slopes @ np.diff(loads[records] ** 2, prepend=0.0)
-    followed, controlled = dissipated(points)[-1]
+    released, controlled = dissipated(points)[-1]
     assert abs(area - stored(cell, points[-1]) - controlled) < EXACT * controlled
     # The curve has a snap-back, whose energy a test at rising strain loses too.
-    assert controlled > 1.01 * followed
+    assert controlled > 1.01 * released
 
 
 @pytest.mark.one_rank
@@ -141,13 +140,12 @@ def breaks(cell, points):
     return np.array(rows).reshape(-1, 4)
 
 
-@pytest.mark.parametrize("contact", [True, False])
-def test_beyond_a_waypoint_a_straight_path_is_controlled_by_strain(straight, contact):
+def test_beyond_a_waypoint_a_straight_path_is_controlled_by_strain(straight):
     """The bonds of a snap-back break at the largest load so far, with the energies of rising strain."""
-    cell, points = straight("square", contact)
+    cell, points = straight("square", False)
     whole = breaks(cell, points)
     turn = 0.6 * whole[:, 0].max()
-    split = breaks(cell, follow(cell, [turn * STRAIGHT, STRAIGHT], contact))
+    split = breaks(cell, follow(cell, [turn * STRAIGHT, STRAIGHT], False))
     np.testing.assert_array_equal(split[:, 1], whole[:, 1])
     beyond = np.maximum.accumulate(whole[:, 0]) > turn
     np.testing.assert_allclose(split[beyond, 0], np.maximum.accumulate(whole[:, 0])[beyond], rtol=1e-8)
