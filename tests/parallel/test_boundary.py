@@ -37,23 +37,6 @@ CELLS = pytest.mark.parametrize(
 
 
 @CELLS
-def test_extension_is_harmonic(comm, torn, case):
-    """K u = 0 but on the boundary, where it is S x."""
-    cell = torn(**case)
-    boundary = cell.solver.interface_operators
-    x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
-    forces = boundary.apply_schur(x)
-    for place, (s, dofs, span) in enumerate(zip(cell.subdomains, boundary.dofs, boundary.slices, strict=True)):
-        own = boundary.extend(place, x[span])
-        assert (own[dofs] == x[span]).all()
-        K = s.assemble_stiffness()
-        residual, scale = K @ own, np.abs(K @ np.abs(own)).max()
-        assert np.abs(residual[dofs] - forces[span]).max() < 1e-11 * scale
-        residual[dofs] = 0
-        assert np.abs(residual).max() < 1e-11 * scale
-
-
-@CELLS
 @pytest.mark.parametrize(("kind", "operators"), OPERATORS.items(), ids=OPERATORS)
 def test_torn_cell_equals_the_dense_one(comm, case, kind, operators):
     """P d, P^T F P and the torn cell's stiffness do not depend on the generalized inverse."""

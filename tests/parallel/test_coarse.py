@@ -85,14 +85,6 @@ def test_rigid_motions_need_no_force(narrow):
     assert np.linalg.eigvalsh(narrow.H)[0] > -1e-10 * np.linalg.norm(narrow.H, 2)
 
 
-def test_many_columns_are_preconditioned_as_each_alone(narrow):
-    x = narrow.own(narrow.random(0, (3,)))
-    columns = narrow.solver.preconditioner.apply(x)
-    for k in range(3):
-        alone = narrow.solver.preconditioner.apply(x[:, k].copy())
-        assert np.abs(alone - columns[:, k]).max(initial=0.0) < 1e-10 * np.abs(columns).max(initial=1.0)
-
-
 def test_balanced_forces_are_not_balanced_any_further(comm, narrow):
     """S_0 S+ S_0 = S_0: coarse displacements have found their equilibrium."""
     operators, coarse = narrow.solver.interface_operators, narrow.coarse
