@@ -107,6 +107,11 @@ def test_balancing_bounds_the_spectrum(narrow):
     assert natural > 20 * largest
 
 
+def test_a_higher_threshold_takes_more_vectors(comm, narrow):
+    solver = torn_cells.tear(comm, **NARROW, petsc={"feti_coarse_threshold": 0.5}).solver
+    assert solver.adaptive.threshold == 0.5 and solver.coarse_dimension > narrow.solver.coarse_dimension
+
+
 def test_all_modes_make_the_exact_inverse(comm):
     """Then Z spans all displacements of the glued cell, most of them twice, and there is nothing to iterate."""
     cell = torn_cells.tear(comm, **BREAKING, thresholds=Thresholds(soft_mode=1e12))

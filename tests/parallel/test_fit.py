@@ -209,6 +209,16 @@ def test_stiffnesses_of_a_phase_are_fitted_from_a_corner_of_their_bounds(comm, s
     )
 
 
+def test_stiffnesses_of_an_interface_are_fitted_from_a_corner_of_their_bounds(comm, shared_path):
+    document = {name: FIBRE_THAT_DEBONDS[name] for name in ("cell", "material")}
+    document |= {"analysis": {"type": "stiffness", "plane": "generalized"}, "interface": {"contact": False}}
+    document["measured"] = {name: {"value": 1.0, "std": 1.0} for name in ("E1", "G12", "G13")}
+    truth = {"normal_stiffness": (2000.0, 1.0, 1e6), "tangential_stiffness": (500.0, 1.0, 1e6)}
+    named = {f"interface.{name}": numbers for name, numbers in truth.items()}
+    found = bad_start(comm, shared_path, document, named, (9.8e5, 9.8e5))["unknowns"]
+    assert [own["estimate"] for own in found.values()] == pytest.approx([2000.0, 500.0], rel=1e-5)
+
+
 def test_a_strength_is_fitted_from_a_start_at_which_nothing_breaks(comm, shared_path):
     """The first evaluation has no onset; the best of the further ones leads to the truth."""
     document = copy.deepcopy(FIBRE_THAT_DEBONDS)

@@ -84,7 +84,6 @@ def test_a_fibre_in_a_medium_slips_first_where_the_formula_has_it(comm, friction
 
 OPENED = [[-0.01, -0.004, 0.01], [0.01, 0.01, -0.02]]
 COLD = {"temperature": -300.0, "E33": 0.0}
-AROUND, SHEARS = {"E11": -0.01, "E22": -0.01, "E33": 0.0}, {"gamma13": 0.03, "gamma23": 0.02}
 STRENGTHS = {"normal_strength": 0.03, "tangential_strength": 0.035}
 PATHS = {
     # Of the first rates one set of statuses balances all but the turning of the fibre.

@@ -19,8 +19,6 @@ VOID = {"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}
 OVAL = {"x": 0.5, "y": 0.02, "a": 0.16, "b": 0.08, "angle": 30.0, "phase": "void"}
 ROWS = [VOID, {"x": 0.5, "y": 0.5, "radius": 0.2}, {"x": 0.9, "y": 0.55, "radius": 0.1}, OVAL]
 
-TWICE = {"matrix": MATRIX, "fibre": MATRIX}
-
 
 def table(rows, **keys):
     return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | keys
