@@ -28,12 +28,10 @@ def agreement_is_silent():
 
 @pytest.fixture(scope="module")
 def narrow():
-    """Provide the narrow cell at the default threshold."""
+    """Provide the narrow cell."""
     from support.coarse_space_cells import Narrow
 
-    from feti_homog.feti.thresholds import DEFAULTS
-
-    cell = Narrow(DEFAULTS.soft_mode)
+    cell = Narrow()
     yield cell
     cell.solver.destroy()
 

@@ -62,8 +62,7 @@ def fine(name):
     return stiffness(cell | mesh, phases, plane).effective_stiffness
 
 
-@pytest.mark.parametrize("order", ACCURACIES)
-@pytest.mark.parametrize("name", CELLS)
+@pytest.mark.parametrize(("name", "order"), [*zip(CELLS, (1, 2, 1, 2, 1, 2, 2), strict=True), ("coated", 1)])
 def test_strain_energies_err_by_less_than_asked_for(name, order):
     cell, phases, plane = CELLS[name]
     result = stiffness(cell | {"order": order, "accuracy": ACCURACIES[order]}, phases, plane)
@@ -73,8 +72,15 @@ def test_strain_energies_err_by_less_than_asked_for(name, order):
     assert "coating" in phases or error > 1e-3 * ACCURACIES[order]
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
-@pytest.mark.parametrize(("geometry", "plane"), BONDED)
+@pytest.mark.parametrize(
+    ("geometry", "plane", "accuracy"),
+    [
+        ("square", "strain", 1e-2),
+        ("square", "stress", 1e-4),
+        ("hexagonal", "stress", 1e-2),
+        ("hexagonal", "strain", 1e-6),
+    ],
+)
 def test_bonded_cells_against_their_series(geometry, plane, accuracy):
     exact = cubic(*BONDED[geometry, plane].value)
     for order in (1, 2):
@@ -83,8 +89,7 @@ def test_bonded_cells_against_their_series(geometry, plane, accuracy):
             assert energy_error(stiffness(cell, COMPOSITE, plane).effective_stiffness, exact) < accuracy
 
 
-@pytest.mark.parametrize("order", ACCURACIES)
-@pytest.mark.parametrize("geometry", VOID)
+@pytest.mark.parametrize(("geometry", "order"), [*zip(VOID, ACCURACIES, strict=True)])
 def test_cells_of_free_faces_against_their_series(geometry, order):
     exact = cubic(*VOID[geometry].value)
     cell = {"geometry": geometry, "fibre_fraction": 0.4, "accuracy": ACCURACIES[order], "order": order}
@@ -93,8 +98,7 @@ def test_cells_of_free_faces_against_their_series(geometry, order):
     assert energy_error(found, exact) < ACCURACIES[order]
 
 
-@pytest.mark.parametrize("order", ACCURACIES)
-@pytest.mark.parametrize("key", ELASTIC)
+@pytest.mark.parametrize(("key", "order"), [*zip(ELASTIC, (1, 2, 1, 2, 1), strict=True)])
 def test_elastic_interfaces_against_their_series(key, order):
     geometry, k_n, k_t = key
     cell = {"geometry": geometry, "fibre_fraction": 0.4, "accuracy": ACCURACIES[order], "order": order}

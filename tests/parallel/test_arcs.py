@@ -81,11 +81,13 @@ def check(comm, case, nodes, cell, arcs, opening=None):
         parallel_assert(comm, min(chains, default=1) > 0, f"fibre {fibre}")
 
 
-@pytest.mark.parametrize("bodies", ["torus", "plane"])
-@pytest.mark.parametrize("mesh", [{"order": 1, "refine": 1}, {"order": 2}])
-@pytest.mark.parametrize("cell", [SQUARE, CIRCULAR, RANDOM], ids=["square", "hexagonal", "random"])
-def test_tips_are_nodes_and_stay_bonded(comm, cell, mesh, bodies):
-    case = case_of(cell | mesh | {"bodies": bodies}, [ARC])
+@pytest.mark.parametrize(
+    "cell",
+    [RANDOM | {"order": 2}, RANDOM | {"bodies": "plane", "refine": 1}, SQUARE | {"refine": 1}, CIRCULAR | {"order": 2}],
+    ids=str,
+)
+def test_tips_are_nodes_and_stay_bonded(comm, cell):
+    case = case_of({"order": 1} | cell, [ARC])
     cell, nodes = torn(case, comm)
     fibres = cell.summary.fibres
     check(comm, case, nodes, cell, {fibre: [(0.0, 60.0)] for fibre in range(1, fibres + 1)})
@@ -115,8 +117,7 @@ def test_a_tip_beside_a_crossing_is_the_crossing(comm):
     parallel_assert(comm, np.array_equal(np.flatnonzero(state), np.flatnonzero(inside)))
 
 
-@pytest.mark.parametrize("bodies", ["torus", "plane"])
-@pytest.mark.parametrize(("order", "refine"), [(1, 0), (2, 0), (2, 1)])
+@pytest.mark.parametrize(("order", "refine", "bodies"), [(1, 0, "plane"), (2, 0, "torus"), (2, 1, "torus")])
 def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refine, bodies):
     cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
     for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):

@@ -56,11 +56,7 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     assert relative_error(stress, stress_of_one) < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("contrast", "pieces"),
-    [(1e-3, 24), (1.0, 50), (1e6, 50)],
-    ids=["soft, matrix cut", "equal, all cut", "stiff, all cut"],
-)
+@pytest.mark.parametrize(("contrast", "pieces"), [(1e-3, 24), (1e6, 50)], ids=["soft, matrix cut", "stiff, all cut"])
 def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     case = NARROW | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
@@ -79,16 +75,18 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
 
 
 @pytest.mark.parametrize(
-    ("case", "space", "adaptive"),
+    ("case", "petsc", "adaptive"),
     [
-        (BREAKING, "auto", True),
-        (BREAKING, "natural", False),
-        ({"geometry": "hexagonal"}, "adaptive", True),
-        ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
+        (BREAKING, {}, True),
+        (BREAKING, {"feti_coarse_space": "natural"}, False),
+        ({"geometry": "hexagonal"}, {"feti_coarse_space": "adaptive"}, True),
+        ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, {}, False),
+        (BREAKING, {"feti_dual_operator": "implicit"}, False),
+        (BREAKING, {"feti_pc_type": "lumped"}, False),
     ],
 )
-def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
-    solver = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver
+def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, petsc, adaptive):
+    solver = torn_cells.tear(comm, **case, petsc=petsc).solver
     assert (solver.adaptive is not None) == adaptive
 
 
@@ -98,9 +96,8 @@ MULTIGRID = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("contrast", [1e6])
-def test_a_coarse_problem_solved_by_multigrid_gives_the_same(comm, contrast):
-    case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
+def test_a_coarse_problem_solved_by_multigrid_gives_the_same(comm):
+    case = NARROW | {"fibre": {"young": 3e6, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
     for options in ({}, MULTIGRID):
         cell = torn_cells.tear(comm, **case, petsc=options)
@@ -143,12 +140,6 @@ def test_kernels_are_projected_as_least_squares_do(comm):
         np.testing.assert_allclose(x - natural.G_active @ amplitudes, projected, atol=1e-12)
     assert natural.unconstrained_modes.shape[1] > 0
     cell.destroy()
-
-
-@pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
-def test_the_natural_space_is_taken_where_the_adaptive_one_cannot_be(comm, petsc):
-    cell = torn_cells.tear(comm, **BREAKING, petsc=petsc)
-    assert cell.solver.adaptive is None
 
 
 def number(pattern, text):

@@ -58,15 +58,6 @@ def test_bulk_modulus_is_that_of_a_cylinder_of_cylinders(coating):
     assert result.cell.fractions["coating"] == pytest.approx(outer - share, rel=1e-3)
 
 
-def test_a_coating_of_the_material_around_or_within_is_none():
-    share, thickness = 0.3, 0.1
-    inside = result_of(FIBRE, thickness, fibre_fraction=share).effective_stiffness
-    outside = result_of(MATRIX, thickness, fibre_fraction=share).effective_stiffness
-    larger = result_of(None, fibre_fraction=share * (1 + thickness) ** 2).effective_stiffness
-    assert outside == pytest.approx(result_of(None, fibre_fraction=share).effective_stiffness, abs=1e-4 * 7)
-    assert inside == pytest.approx(larger, abs=1e-4 * 10)
-
-
 @pytest.mark.one_rank
 def test_soft_coatings_tend_to_elastic_interfaces():
     """k_n = (lambda + 2 G) / t and k_t = G / t, as t / a falls with the stiffness: an error of the first order in t."""
@@ -84,7 +75,7 @@ def test_soft_coatings_tend_to_elastic_interfaces():
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("young", [3e-3, 3.0, 3e3])
+@pytest.mark.parametrize("young", [3e-3, 3e3])
 def test_thin_coatings_take_few_iterations(young):
     cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
     result = result_of((young, 0.3), 0.01, **cell)

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from reference.spatial_forms import axial_shear_modulus
 from support.void_cells import write_voids
 
@@ -47,10 +46,9 @@ def solved(comm, folder=".", **case):
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("bonds", BONDS)
-@pytest.mark.parametrize(("seed", "order"), [(1, 1), (2, 2)])
-def test_axial_shear_with_moduli_k_is_conduction(comm, shared_interfaces, seed, bonds, order):
-    case = document(**RANDOM, seed=seed, order=order, interface=BONDS[bonds], sections=SEVERAL)
+@pytest.mark.parametrize(("bonds", "order"), [("none", 2), ("springs", 1), ("arc", 2)])
+def test_axial_shear_with_moduli_k_is_conduction(comm, shared_interfaces, bonds, order):
+    case = document(**RANDOM, seed=order, order=order, interface=BONDS[bonds], sections=SEVERAL)
     k = compute(Case.parse(case), comm).effective_conductivity
     case["analysis"] = {"type": "stiffness", "plane": "generalized"}
     case["material"] = {
@@ -167,7 +165,6 @@ def test_coated_fibres_with_two_resistances(comm, shared_path):
     if comm.rank == 0:
         certificate = verify(shared_path)
         assert certificate.holds and NO_REASON not in certificate.unchecked, certificate.text
-    comm.barrier()
 
 
 @pytest.mark.one_rank
@@ -179,16 +176,6 @@ def test_bounds_and_maxwell_of_bonded_fibres(comm):
     assert forms.maxwell == pytest.approx(maxwell) and forms.hashin_shtrikman[0] == pytest.approx(maxwell)
     assert forms.hashin_shtrikman[0] < k[0, 0] < forms.hashin_shtrikman[1] < forms.wiener[1]
     assert not result.remarks
-
-
-@pytest.mark.parametrize("bonds", BONDS)
-def test_ranks_agree(comm, bonds):
-    case = Case.parse(document(**RANDOM, order=2, interface=BONDS[bonds]))
-    results = compute(case, comm), compute(case, MPI.COMM_SELF)
-    together, alone = (result.effective_conductivity for result in results)
-    assert together == pytest.approx(alone, rel=1e-10, abs=1e-10 * alone.max())
-    errors = [result.mesh_error.effective_conductivity for result in results]
-    assert errors[0] == pytest.approx(errors[1], rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.one_rank

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from reference.references import ARC_OF_120_DEGREES, ARC_OF_120_DEGREES_FINE, VOID
+from reference.references import ARC_OF_120_DEGREES, ARC_OF_120_DEGREES_FINE
 from support import torn_cells
 from support.cases import relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
@@ -68,39 +68,6 @@ def test_random_cells_equal_the_quadratic_programme(comm, number):
             assert (status[tight & ~bonded] == CLOSED).all()
 
 
-def test_sigma_is_homogeneous_of_degree_one(comm):
-    rng = np.random.default_rng(5)
-    cell = torn_cells.tear(comm, geometry="hexagonal", order=2, mesh_size=0.25)
-    status = np.where(np.abs(directions(cell) - 20) < 70, OPEN, BONDED).astype(np.int8)
-    for strain in rng.normal(size=(3, 3)):
-        stress, _ = response(cell, True, strain, status)
-        for t in (1e-6, 30.0):
-            assert relative_error(response(cell, True, t * strain, status)[0], t * stress) < 1e-8
-        assert relative_error(response(cell, True, -strain, status)[0], -stress) > 1e-3
-
-
-def test_sign_of_shear_flips_only_the_shear_stress(comm):
-    cell = torn_cells.tear(comm, [Arc(fibre="all", angle=120.0)], geometry="square", mesh_size=0.07, order=2)
-    status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
-    plus, minus = (response(cell, True, [-0.5, 0.2, sign * 0.7], status)[0] for sign in (1, -1))
-    # The mesh is not symmetric.
-    assert relative_error(plus, minus * [1, 1, -1]) < 1e-3
-
-
-@pytest.mark.quick
-@pytest.mark.parametrize("seed", range(3))
-def test_energy_of_free_contact_and_bonded_faces_rises(comm, seed):
-    rng = np.random.default_rng(seed)
-    cell = torn_cells.tear(comm, geometry="random", fibres=4, min_gap=0.1, seed=seed, mesh_size=0.2)
-    status = np.where(np.cos(np.radians(3 * directions(cell))) < 0.3, OPEN, BONDED).astype(np.int8)
-    for strain in rng.normal(size=(4, 3)):
-        free, contact, bonded = (
-            torn_cells.energy(cell, response(cell, touch, strain, states)[1].solution)
-            for touch, states in ((False, status), (True, status), (True, np.full_like(status, BONDED)))
-        )
-        assert free * (1 - 1e-9) < contact < bonded * (1 - 1e-6)
-
-
 @pytest.mark.quick
 def test_debonded_fibre_with_contact_is_a_void_under_tension(comm):
     cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.2)
@@ -108,14 +75,6 @@ def test_debonded_fibre_with_contact_is_a_void_under_tension(comm):
     stress, state = response(cell, True, [1, 0, 0], status)
     assert relative_error(stress, stiffness(cell, status)[:, 0]) < 1e-9
     assert comm.allreduce(int((state.status != OPEN).sum())) == 0
-
-
-@pytest.mark.parametrize("geometry", VOID)
-def test_debonded_fibres_without_contact_are_voids(comm, geometry):
-    expected = VOID[geometry].value
-    cell = torn_cells.tear(comm, geometry=geometry, order=2, mesh_size=0.07, refine=1)
-    L = stiffness(cell, np.full(len(directions(cell)), OPEN, np.int8))
-    assert np.abs([L[0, 0] / expected[0], L[0, 1] / expected[1], L[2, 2] / expected[2]] - np.ones(3)).max() < 1e-4
 
 
 def arc_of_120_degrees(comm, **case):
@@ -196,6 +155,7 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
         assert relative_error(stress, expected) < 1e-10
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize("subdomains", [1, 12])
 def test_free_motions_of_debonded_fibres_are_counted(comm, bodies, subdomains):
@@ -263,15 +223,14 @@ def test_single_pivots_find_the_same_state(comm, half):
     assert relative_error(stress, expected) < 1e-9
 
 
-@pytest.mark.parametrize("strain", [(0, -1, 0), (0, 0, 1)], ids=["E22", "gamma12"])
-def test_forces_between_pieces_of_a_stiff_matrix_hide_no_tension(comm, strain):
+def test_forces_between_pieces_of_a_stiff_matrix_hide_no_tension(comm):
     """Forces between pieces are 10 000 times those on a soft fibre; contact does not depend on them."""
     arc, fibre = Arc(fibre="all", centre=20.0, angle=140.0), {"young": 88e-4, "poisson": 0.222}
     cell = {"fibre": fibre, "mesh_size": 0.1, "refine": 2, "petsc": {"feti_ksp_rtol": 1e-8}}
     found = []
     for pieces in ({"subdomains": 40}, {}):
         torn = torn_cells.tear(comm, [arc], decomposition=pieces, **cell)
-        stress, state = response(torn, True, strain, np.where(torn.debonded(None), OPEN, BONDED).astype(np.int8))
+        stress, state = response(torn, True, [0, -1, 0], np.where(torn.debonded(None), OPEN, BONDED).astype(np.int8))
         forces = state.solution.lam[torn.solver.jump_operator.nodes.row]
         largest = [comm.allreduce(np.abs(all_of).max(initial=0.0), MPI.MAX) for all_of in (state.solution.lam, forces)]
         parallel_assert(comm, max(state.certificate.values()) < 1e-7, f"{state.certificate}")

@@ -13,27 +13,26 @@ pytestmark = pytest.mark.parallel
 
 MESHES = Path(__file__).parents[2] / "meshes"
 TIGHT = 1e-9
+RANDOM = {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.15, "seed": 3, "order": 2}
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize(
-    ("pieces", "bodies"),
-    [({}, "torus"), ({"subdomains": 9}, "torus"), ({"max_dofs": 150}, "plane")],
-    ids=["whole", "number", "size"],
-)
-@pytest.mark.parametrize(
-    "cell",
+    ("cell", "pieces"),
     [
-        {"geometry": "square"},
-        {"geometry": "hexagonal", "refine": 1},
-        {"geometry": "hexagonal", "order": 2},
-        {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.15, "seed": 3, "order": 2},
-        {"geometry": "hexagonal", "interface_size": 0.02},
+        ({"geometry": "hexagonal", "refine": 1}, {"subdomains": 9}),
+        ({"geometry": "square"}, {}),
+        ({"geometry": "square", "bodies": "plane"}, {"max_dofs": 150}),
+        ({"geometry": "hexagonal", "order": 2, "bodies": "plane"}, {}),
+        (RANDOM, {"subdomains": 9}),
+        (RANDOM, {}),
+        (RANDOM | {"bodies": "plane"}, {"max_dofs": 150}),
+        ({"geometry": "hexagonal", "interface_size": 0.02}, {}),
     ],
-    ids=["square", "hexagonal", "quadratic", "random", "fine interfaces"],
+    ids=str,
 )
-def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces, bodies):
-    torn, L, responses = solve(make_case(bodies=bodies, decomposition=pieces, **cell), comm)
+def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces):
+    torn, L, responses = solve(make_case(decomposition=pieces, **cell), comm)
     assert relative_error(L, monolithic_stiffness(torn)) < TIGHT
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(max(r.checks.values()) for r in responses) < 1e-8
@@ -71,15 +70,8 @@ def test_an_isotropic_phase_has_the_same_elements_in_either_form(comm):
 @pytest.mark.one_rank
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize(
-    "material",
-    [
-        {"young": 3.0, "poisson": 0.3},
-        {"E1": 10.0, "E2": 2.0, "E3": 3.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.2, "G12": 1.5, "angle": 25.0},
-    ],
-    ids=["isotropic", "orthotropic"],
-)
-def test_homogeneous_cell_is_exact(comm, material, order, plane):
+def test_homogeneous_cell_is_exact(comm, order, plane):
+    material = {"E1": 10.0, "E2": 2.0, "E3": 3.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.2, "G12": 1.5, "angle": 25.0}
     case = make_case(matrix=material, fibre=material, order=order, plane=plane, mesh_size=0.2)
     _, L, _ = solve(case, comm)
     expected = homogeneous(material, plane)
@@ -104,7 +96,7 @@ def test_equal_shear_moduli_obey_hill(comm, cell):
     assert abs(L[2, 2] - mu) < 2e-6 * mu
 
 
-@pytest.mark.parametrize("contrast", [1e-4, 1e-2, 1e3, 1e6])
+@pytest.mark.parametrize("contrast", [1e-4, 1e6])
 def test_stiffness_is_monolithic_at_any_contrast(comm, contrast):
     fibre = {"young": contrast, "poisson": 0.3}
     case = make_case(matrix={"young": 1.0, "poisson": 0.3}, fibre=fibre, decomposition={"subdomains": 6})
@@ -113,7 +105,7 @@ def test_stiffness_is_monolithic_at_any_contrast(comm, contrast):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
-@pytest.mark.parametrize("contrast", [1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("contrast", [1e-3, 1e6])
 def test_nearly_incompressible_pieces_are_monolithic_in_few_iterations(comm, contrast):
     """Beside fibres as stiff as the diagonal of its K, a matrix is softer than it by the factor lambda / mu."""
     fibre, cell = {"young": contrast, "poisson": 0.3}, {"mesh_size": 0.1, "decomposition": {"subdomains": 8}}

@@ -9,17 +9,13 @@ import pytest
 from reference.closed_forms import lame
 from support import torn_cells
 from support.cases import FIBRE, MATRIX
-from support.loads import strains
+from support.load_paths import beginning, followed
 from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
-from feti_homog.interface.path.path_following import events
-from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
@@ -32,18 +28,8 @@ def strip(comm, shared_path):
     """Provide a cell with a strip of fibre normal to x1, a quarter of it, at either order."""
     write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
     petsc = {"feti_pc_type": "influence"}
-    cells = [
-        torn_cells.tear(
-            comm,
-            geometry="mesh",
-            file="strip.msh",
-            folder=shared_path,
-            order=order,
-            springs=(NORMAL, TANGENTIAL),
-            petsc=petsc,
-        )
-        for order in (1, 2)
-    ]
+    strip = {"geometry": "mesh", "file": "strip.msh", "folder": shared_path, "petsc": petsc}
+    cells = [torn_cells.tear(comm, **strip, order=order, springs=(NORMAL, TANGENTIAL)) for order in (1, 2)]
     yield cells
     for cell in cells:
         cell.solver.destroy()
@@ -60,16 +46,11 @@ def moduli():
     return series(la_m + 2 * mu_m, la_f + 2 * mu_f, NORMAL), series(mu_m, mu_f, TANGENTIAL)
 
 
-def bonded(cell):
-    return np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
-
-
 def test_the_stiffness_is_exact(strip):
     for cell in strip:
-        status, starts = bonded(cell), [np.zeros(cell.solver.rows)] * 3
-        L = np.array(
-            [r.stress for r in Homogenization(cell, True).respond(np.eye(3), torn_cells.bonds(status), starts)]
-        ).T
+        homogenization, starts = Homogenization(cell, True), [np.zeros(cell.solver.rows)] * 3
+        bonds = beginning(homogenization.interface).bonds
+        L = np.array([r.stress for r in homogenization.respond(np.eye(3), bonds, starts)]).T
         C11, C33 = moduli()
         assert L[0, 0] == pytest.approx(C11, rel=1e-9) and L[2, 2] == pytest.approx(C33, rel=1e-9)
 
@@ -82,12 +63,7 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
         springs = SpringEnergy(NORMAL, TANGENTIAL, TOUGHNESS, 0.25)
         law = springs if growth == "springs" else ReleasedEnergy.of(springs, cell.solver.exact_inverse)
         strain = np.array([[2 * peak / C11, 0.0, 0.0]])
-        first, last = events(
-            CoupledInterfaces(interface),
-            law,
-            strains(strain),
-            unloaded(CoupledInterfaces(interface), torn_cells.bonds(bonded(cell))),
-        )
+        first, last = followed(interface, law, strain)
         assert first.load_factor == pytest.approx(0.5, rel=1e-8)
         assert first.scale * interface.stress(first.state.solution)[0] == pytest.approx(peak, rel=1e-8)
         assert first.broke == comm.allreduce(len(interface.nodes.row))

@@ -10,6 +10,7 @@ from reference.closed_forms import bulk_and_shear
 from reference.coated_fibre import onset_of_fibre
 from reference.references import GLASS_EPOXY_CURVES, GLASS_EPOXY_DEBONDED, GLASS_EPOXY_MULTIPLES, GLASS_EPOXY_ONSET
 from support import torn_cells
+from support.load_paths import beginning, followed
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
@@ -20,7 +21,6 @@ from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
-from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
@@ -44,12 +44,7 @@ def path(comm, growth, strain, **case):
     """Return the interface and the points of a path straight to a strain."""
     cell = torn_cells.tear(comm, **case)
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
-    return (
-        cell,
-        interface,
-        list(events(CoupledInterfaces(interface), criterion(cell, growth), strains(np.array([strain])), begin)),
-    )
+    return cell, interface, followed(interface, criterion(cell, growth), [strain])
 
 
 def onset(comm, **case):
@@ -144,7 +139,7 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
         **GLASS_EPOXY,
     )
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
+    begin = beginning(interface)
     responses = interface.equilibria(np.eye(3), begin.bonds, [begin.lam[0]] * 3)
     L = np.array([interface.stress(response.solution) for response in responses]).T
     matrix, fibre = (

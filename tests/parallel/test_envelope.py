@@ -26,7 +26,6 @@ BONDS = {"max": MAX, "quadratic": QUADRATIC, "energy": ENERGY}
 RANDOM = {
     "cell": {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "fibre_fraction": 0.4, "mesh_size": 0.2}
 }
-SQUARE = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1, "order": 2}}
 ARC = {"contact": False, "debonded": [{"fibre": 1, "centre": 20.0, "angle": 50.0}]}
 
 
@@ -41,9 +40,9 @@ def unit(point, axes, names):
     return load
 
 
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-@pytest.mark.parametrize("bonds", BONDS.values(), ids=BONDS)
-def test_onsets_are_the_first_events_of_paths(comm, plane, bonds):
+@pytest.mark.parametrize(("name", "plane"), [("max", "strain"), ("quadratic", "stress"), ("energy", "strain")])
+def test_onsets_are_the_first_events_of_paths(comm, plane, name):
+    bonds = BONDS[name]
     result = envelope(comm, plane, bonds, ["E11", "gamma12"], RANDOM, directions=12)
     with torn(comm, plane, bonds, **RANDOM) as cell:
         for point in result.envelope:
@@ -75,30 +74,6 @@ def test_in_a_plane_of_stresses_the_other_stress_is_none(comm):
             factor, stress = path_onset(cell, point.strain)
             parallel_assert(comm, abs(factor - 1) < 1e-9)
             parallel_assert(comm, np.abs(stress - point.stress).max() < 1e-9 * point.factor)
-
-
-@pytest.mark.one_rank
-@pytest.mark.parametrize("name", BONDS)
-def test_onsets_grow_with_the_strength(comm, name):
-    stronger = {
-        "max": {key: 2.5 * MAX[key] for key in MAX},
-        "quadratic": QUADRATIC | {key: 2.5 * MAX[key] for key in MAX},
-        "energy": ENERGY | {"toughness": 2.5**2 * ENERGY["toughness"]},
-    }[name]
-    results = [envelope(comm, "strain", bonds, ["S11", "S22"], directions=10) for bonds in (BONDS[name], stronger)]
-    weak, strong = map(factors, results)
-    parallel_assert(comm, np.abs(strong / weak - 2.5).max() < 1e-10)
-    for one, other in zip(results[0].envelope, results[1].envelope, strict=True):
-        parallel_assert(comm, (one.fibre, one.bond_angle) == (other.fibre, other.bond_angle))
-
-
-@pytest.mark.one_rank
-def test_a_square_cell_is_as_strong_along_both_axes_and_in_both_shears(comm):
-    """Equal as far as the mesh is symmetric."""
-    of_axes = factors(envelope(comm, "strain", MAX, ["S11", "S22"], SQUARE, directions=16))
-    parallel_assert(comm, np.abs(of_axes / of_axes[(4 - np.arange(16)) % 16] - 1).max() < 2e-3)
-    with_shear = factors(envelope(comm, "strain", QUADRATIC, ["S11", "S12"], SQUARE, directions=16))
-    parallel_assert(comm, np.abs(with_shear / with_shear[-np.arange(16)] - 1).max() < 2e-3)
 
 
 def test_compression_breaks_no_bond_that_only_tension_breaks(comm):
@@ -144,11 +119,15 @@ def share(bonds, stress):
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize(
-    ("axes", "temperature"),
-    [(["S11", "S13"], -3.0), (["S12", "S13"], None), (["gamma13", "E33"], None), (["gamma13", "E33"], -3.0)],
+    ("name", "axes", "temperature"),
+    [
+        *(("max", ["S11", "S13"], -3.0), ("quadratic", ["S11", "S13"], -3.0), ("energy", ["S12", "S13"], None)),
+        *(("quadratic", ["gamma13", "E33"], None), ("energy", ["gamma13", "E33"], -3.0)),
+    ],
+    ids=str,
 )
-@pytest.mark.parametrize("bonds", IN_SPACE.values(), ids=IN_SPACE)
-def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, bonds, temperature, axes):
+def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, name, axes, temperature):
+    bonds = IN_SPACE[name]
     own = {} if temperature is None else {"temperature": temperature}
     result = envelope(comm, "generalized", bonds, axes, STRIP | EXPANDING, strip, directions=12, **own)
     for point in result.envelope:

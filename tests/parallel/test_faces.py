@@ -18,7 +18,6 @@ pytestmark = pytest.mark.parallel
 WHOLE = NARROW | {"decomposition": {"subdomains": 17}}
 CASES = {
     "whole": WHOLE,
-    "all cut": NARROW | {"decomposition": {"subdomains": 50}},
     "plane, quadratic": {"geometry": "hexagonal", "mesh_size": 0.2, "order": 2, "bodies": "plane"},
 }
 TIGHT = 1e-9
@@ -28,7 +27,7 @@ FACEWISE = Thresholds(whole_boundary_dofs=30)
 
 @pytest.fixture(scope="module", params=CASES.values(), ids=CASES.keys())
 def faces(request):
-    """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
+    """(subdomain, boundary dofs, S, face, its neighbourhoods) of all pairs of neighbours."""
     comm = MPI.COMM_WORLD
     cell = torn_cells.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
     solver, operators, found = cell.solver, cell.solver.interface_operators, []
@@ -39,7 +38,8 @@ def faces(request):
         for other, common in neighbours.common[i].items():
             if other != s.submesh.index:
                 nodes = np.unique(B[neighbours.rows[i][common]].indices // s.problem.components)
-                found.append((s, dofs, S, s.problem.dofs(nodes)))
+                face = s.problem.dofs(nodes)
+                found.append((s, dofs, S, face, face_neighbourhoods(s, dofs, face)))
     return found
 
 
@@ -48,8 +48,7 @@ def faces(request):
 
 def test_the_energy_of_a_body_lies_between_those_of_neighbourhoods(comm, faces):
     covered = np.zeros(2)
-    for s, dofs, S, face in faces:
-        found = face_neighbourhoods(s, dofs, face)
+    for *_, S, face, found in faces:
         at = np.concatenate([np.zeros(0, int), *(near.at for near in found)])
         assert set(at) <= set(face)
         covered += [len(set(at)), len(face)]
@@ -65,8 +64,8 @@ def test_the_energy_of_a_body_lies_between_those_of_neighbourhoods(comm, faces):
 
 def test_kernels_of_neighbourhoods_are_the_null_spaces_of_their_stiffness(comm, faces):
     kernels = set()
-    for s, dofs, _, face in faces:
-        for near in face_neighbourhoods(s, dofs, face):
+    for *_, found in faces:
+        for near in found:
             S = near.operator.S
             assert np.abs(S @ near.R).max(initial=0.0) < TIGHT * np.abs(S).max()
             assert dense_feti.kernel(S).shape[1] == near.R.shape[1]
@@ -76,7 +75,7 @@ def test_kernels_of_neighbourhoods_are_the_null_spaces_of_their_stiffness(comm, 
 
 
 def test_a_neighbourhood_of_the_whole_body_is_as_stiff(faces):
-    for s, dofs, S, face in faces:
+    for s, dofs, S, face, _ in faces:
         if len(face) < 4:  # a single node
             continue
         (near,) = face_neighbourhoods(s, dofs, face, Thresholds(face_layers=100))
@@ -90,7 +89,7 @@ def test_a_neighbourhood_of_the_whole_body_is_as_stiff(faces):
 # Solutions.
 
 
-@pytest.mark.parametrize("contrast", [1e-3, 2.0, 1e6])
+@pytest.mark.parametrize("contrast", [1e-3, 1e6])
 def test_iterations_stay_few_at_any_contrast(comm, contrast):
     case = WHOLE | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},

@@ -1,9 +1,8 @@
-"""Every faulty case and mesh through the command line, by all ranks together: reported once, nothing written.
+"""Faulty cases and meshes through the command line, by all ranks together: reported once, nothing written.
 
-`check` and `run` read a case and mesh its cell by the same calls: `check` has all faults, and `run`, whose folder must
-not be made, one of each class.  A class are the faults of a section that name something missing, unknown, or expected
-otherwise; of other faults, and of meshes, those whose words begin alike.  On several ranks, all of which must hear of
-what rank 0 finds, both commands have one of each class.
+`check` and `run`, whose folder must not be made, meet one fault of each class; unit tests have all of them.  A class
+are the faults of a section that name something missing, unknown, or expected otherwise; of other faults, and of meshes,
+those whose words begin alike.
 """
 
 import re
@@ -11,7 +10,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from mpi4py import MPI
 from support.base_case import BASE
 from support.ranks import parallel_assert
 from unit.case.faulty_bonding import FAULTY_BONDINGS
@@ -39,12 +37,11 @@ def fault_class(message: str) -> tuple[str, ...]:
 
 
 def by_command(messages: Mapping[Any, str]) -> list[tuple[str, Any]]:
-    """Commands with the names of the faults that they meet: all with `check` on one rank, else the first of a class."""
+    """Commands with the names of the faults that they meet, the first of each class."""
     first: dict[tuple[str, ...], Any] = {}
     for name, message in messages.items():
         first.setdefault(fault_class(message), name)
-    checked = messages if MPI.COMM_WORLD.size == 1 else first.values()
-    return [*(("check", name) for name in checked), *(("run", name) for name in first.values())]
+    return [(command, name) for command in ("check", "run") for name in first.values()]
 
 
 @pytest.mark.parametrize(("command", "name"), by_command({words: words for words in FAULTY}))

@@ -82,33 +82,8 @@ def test_a_fibre_in_a_medium_slips_first_where_the_formula_has_it(comm, friction
     assert slipped.stress[0] + 1.0 == pytest.approx(load, rel=5e-3)
 
 
-def test_limits_of_the_coefficient(comm):
-    """Hardly any friction is none, much under pressure is a bonded cell."""
-    case = {"cell": {}, "phases": EPOXY_GLASS, "plane": "strain", "path": {"waypoints": PRESSED}}
-    for interface, other in (({"friction": 1e-11}, WHOLE), ({"friction": 1e3}, {})):
-        found = at_ends(solved(comm, **case, interface=WHOLE | interface).path, 3)
-        expected = at_ends(solved(comm, **case, interface=other).path, 3)
-        for point, known in zip(found, expected, strict=True):
-            np.testing.assert_allclose(point.stress, known.stress, atol=1e-9)
-            assert point.friction_heat < 1e-9
-
-
-def test_generalized_plane_strain_has_the_numbers_of_plane_strain_in_the_plane(comm):
-    """Shear along the fibres changes none of them, but adds its own stress."""
-    case = {"cell": {}, "phases": EPOXY_GLASS, "interface": WHOLE | {"friction": 0.3}}
-    expected = solved(comm, **case, plane="strain", path={"waypoints": PRESSED}).path
-    waypoints = [dict(zip(("E11", "E22", "gamma12"), strain, strict=True)) for strain in PRESSED]
-    waypoints = [{"E33": 0.0, "gamma13": 0.01} | strain for strain in waypoints]
-    found = solved(comm, **case, plane="generalized", path={"waypoints": waypoints}).path
-    known = [[p.load_factor, *p.stress, p.friction_heat] for p in expected]
-    own = [[p.load_factor, *np.array(p.stress)[[0, 1, 5]], p.friction_heat] for p in found]
-    np.testing.assert_allclose(own, known, atol=1e-11)
-    assert found[-1].friction_heat > 0.0 and found[-1].stress[4] > 0.005
-
-
 OPENED = [[-0.01, -0.004, 0.01], [0.01, 0.01, -0.02]]
 COLD = {"temperature": -300.0, "E33": 0.0}
-AROUND, SHEARS = {"E11": -0.01, "E22": -0.01, "E33": 0.0}, {"gamma13": 0.03, "gamma23": 0.02}
 STRENGTHS = {"normal_strength": 0.03, "tangential_strength": 0.035}
 PATHS = {
     # Of the first rates one set of statuses balances all but the turning of the fibre.

@@ -51,16 +51,15 @@ def compare(comm, tolerance=TIGHT, **case):
 
 @pytest.mark.quick
 @pytest.mark.parametrize(
-    "case",
+    ("case", "sections"),
     [
-        {"geometry": "square", "refine": 1, "mesh_size": 0.3},
-        {"geometry": "hexagonal", "order": 2, "mesh_size": 0.4},
-        {"geometry": "hexagonal", "bodies": "plane"},
-        {"geometry": "random", "fibres": 3, "min_gap": 0.15, "seed": 3},
+        ({"geometry": "square", "refine": 1, "mesh_size": 0.3}, CUT),
+        ({"geometry": "hexagonal", "order": 2, "mesh_size": 0.4}, CUT),
+        ({"geometry": "hexagonal", "bodies": "plane"}, {}),
+        ({"geometry": "random", "fibres": 3, "min_gap": 0.15, "seed": 3}, {}),
     ],
-    ids=lambda case: case["geometry"],
+    ids=str,
 )
-@pytest.mark.parametrize("sections", [{}, CUT], ids=["whole", "cut"])
 def test_bonded_cell_has_the_stiffness_of_its_twin(comm, case, sections):
     C = compare(comm, **ORTHOTROPIC, sections=sections, **case).effective_stiffness
     # The axes of the phases are not those of the cell: nothing vanishes but what has to.
@@ -96,7 +95,7 @@ def test_nearly_incompressible_matrix(comm):
     compare(comm, matrix={"young": 3.0, "poisson": 0.4999, "expansion": 50.0}, order=2, mesh_size=0.3)
 
 
-OPEN = [("all", 20.0, 80.0)], [(1, 20.0, 80.0), (2, -100.0, 200.0)], [(1, 0.0, 360.0)], [("all", 0.0, 360.0)]
+OPEN = [(1, 20.0, 80.0), (2, -100.0, 200.0)], [(1, 0.0, 360.0)], [("all", 0.0, 360.0)]
 
 
 @pytest.mark.one_rank
@@ -113,11 +112,14 @@ def test_free_faces_of_curved_elements(comm):
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize(
-    "springs",
-    [SPRINGS, {"normal_stiffness": 0.5, "tangential_stiffness": 2.0}, dict.fromkeys(SPRINGS, 1e5)],
+    ("springs", "given"),
+    [
+        (SPRINGS, [(1, 20.0, 80.0)]),
+        ({"normal_stiffness": 0.5, "tangential_stiffness": 2.0}, []),
+        (dict.fromkeys(SPRINGS, 1e5), [(1, 20.0, 80.0)]),
+    ],
     ids=["stiff", "soft", "very stiff"],
 )
-@pytest.mark.parametrize("given", [[], [(1, 20.0, 80.0)]], ids=["bonded", "debonded"])
 def test_elastic_interfaces(comm, springs, given):
     compare(comm, **ORTHOTROPIC, geometry="hexagonal", sections=arcs(*given, contact=False, **springs))
 
@@ -128,7 +130,7 @@ def test_elastic_interfaces_of_curved_elements(comm):
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("given", [OPEN[0], OPEN[2]], ids=["arc", "whole"])
+@pytest.mark.parametrize("given", [[("all", 20.0, 80.0)], OPEN[1]], ids=["arc", "whole"])
 @pytest.mark.parametrize("springs", [{}, SPRINGS], ids=["glue", "springs"])
 def test_contact(comm, given, springs):
     sections = arcs(*given, **springs)
@@ -139,15 +141,16 @@ def test_contact(comm, given, springs):
     assert error(C[3:5, 3:5], compression[3:5, 3:5]) < TIGHT
 
 
-@pytest.mark.parametrize("pc", ["lumped", "influence"])
-def test_contact_by_any_preconditioner(comm, pc):
-    compare(comm, mesh_size=0.25, tip_size=0.1, petsc={"feti_pc_type": pc}, sections=arcs(("all", 0.0, 90.0)) | CUT)
+def test_contact_by_another_preconditioner(comm):
+    compare(
+        comm, mesh_size=0.25, tip_size=0.1, petsc={"feti_pc_type": "lumped"}, sections=arcs(("all", 0.0, 90.0)) | CUT
+    )
 
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("expansions", "angle"),
-    [((5e-6, 1e-7), 80.0), ((1e-7, 5e-6), 360.0), ((2.0, 2.0), 80.0), ((0.0, 0.0), 360.0), ((0.0, 1.0), 80.0)],
+    [((5e-6, 1e-7), 80.0), ((2.0, 2.0), 80.0), ((0.0, 0.0), 360.0), ((0.0, 1.0), 360.0)],
     ids=str,
 )
 def test_contact_under_a_temperature(comm, expansions, angle):

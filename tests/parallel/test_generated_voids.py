@@ -19,8 +19,6 @@ VOID = {"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}
 OVAL = {"x": 0.5, "y": 0.02, "a": 0.16, "b": 0.08, "angle": 30.0, "phase": "void"}
 ROWS = [VOID, {"x": 0.5, "y": 0.5, "radius": 0.2}, {"x": 0.9, "y": 0.55, "radius": 0.1}, OVAL]
 
-TWICE = {"matrix": MATRIX, "fibre": MATRIX}
-
 
 def table(rows, **keys):
     return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | keys
@@ -108,17 +106,6 @@ def test_an_accuracy_counts_free_faces_of_voids():
         cases.parse(document | {"cell": {"fibre_list": rows} | asked}, Path()) for rows in (ROWS[1:3], ROWS[:3])
     )
     assert void.cell.refine > plain.cell.refine == 0
-
-
-@pytest.mark.one_rank
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
-    """The void has the inner radius of the tube, on another mesh."""
-    keys = {"mesh_size": 0.05, "order": order, "refine": 1}
-    tube = solved(comm, table([ROWS[1] | {"radius": 0.3, "inner_radius": 0.2}], **keys), material=TWICE)
-    hole = solved(comm, table([ROWS[1] | {"phase": "void"}], **keys), fibre=False)
-    assert tube.cell.porosity == pytest.approx(hole.cell.porosity, rel=1e-3)
-    assert relative_error(tube.effective_stiffness, hole.effective_stiffness) < {1: 4e-3, 2: 1e-4}[order]
 
 
 @pytest.mark.one_rank

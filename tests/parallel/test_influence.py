@@ -66,7 +66,7 @@ def states(cell):
 
 
 @CELLS
-@pytest.mark.parametrize("columns", [700, 20, 1], ids=["one reference cell", "some", "one a state"])
+@pytest.mark.parametrize("columns", [700, 20], ids=["one reference cell", "some"])
 def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case, columns):
     cell = torn_cells.tear(comm, **case, petsc=INFLUENCE | {"feti_influence_columns": columns})
     dense, influence = DenseDual(cell), cell.solver.exact_inverse
@@ -229,24 +229,6 @@ def test_new_columns_show_what_is_wrong_in_those_that_are_followed(comm, unit):
         at = slice(rows[-1 - wrong], rows[-1 - wrong] + 2)
         assert np.abs(block - expected[at, at]).max() < 1e-8 * size
         assert (influence._followed is followed) != wrong
-
-
-@CELLS
-def test_influence_columns_leave_nothing_to_iterate(comm, case):
-    cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)
-    other = torn_cells.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
-    largest, iterations = 0.0, 0
-    for status in states(cell):
-        activate(cell, status)
-        activate(other, status)
-        for found, expected in zip(solve_many(cell), solve_many(other), strict=True):
-            assert found.reason > 0 and found.iterations <= 1
-            iterations = max(iterations, expected.iterations)
-            lam = [gathered(c, s.lam) for c, s in ((cell, found), (other, expected))]
-            # A single fibre that is loose has no multipliers.
-            largest = max(largest, np.abs(lam[1]).max())
-            assert np.abs(lam[0] - lam[1]).max() < 1e-5 * largest
-    assert iterations > 1
 
 
 def test_influence_columns_stay_exact_at_narrow_gaps_and_contrasts(comm):

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from scipy.stats import weibull_min
-from support.ranks import PIECES
+from support.ranks import PIECES, assert_certified
 
 from feti_homog import Case, run
 from feti_homog.homogenization.phase_laws import strength_factors
-from feti_homog.system.parallel.mpi_errors import on_root
-from feti_homog.verify.certificate import verify
 
 EPOXY, GLASS = {"young": 2.79, "poisson": 0.33}, {"young": 70.8, "poisson": 0.22}
 CENTRES = [(1.0, 1.1), (3.0, 0.9), (1.9, 2.9)]
@@ -93,8 +91,7 @@ def test_fibres_break_as_with_interfaces_of_their_own(comm, shared_path, law, co
         assert [(p.fibre, p.factor) for p in found.envelope] == [
             (p.fibre, pytest.approx(p.factor, rel=1e-9)) for p in expected.envelope
         ]
-    certificate = on_root(comm, verify, shared_path / "out")
-    assert certificate.holds, certificate
+    assert_certified(comm, shared_path / "out")
 
 
 @pytest.mark.one_rank

@@ -5,15 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import torn_cells
-from support.loads import strains
+from support.load_paths import followed
 from support.ranks import PIECES
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.interface.loads import Load
-from feti_homog.interface.path.path_following import events
-from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -35,15 +31,6 @@ WAYPOINTS = {
 NEVER = MaxStrength(np.inf, np.inf)
 
 
-def interface_with(cell, is_debonded):
-    """Return the interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
-    interface = torn_cells.interface(cell, True)
-    debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
-    return interface, unloaded(
-        CoupledInterfaces(interface), torn_cells.bonds(np.where(debonded, OPEN, BONDED).astype(np.int8))
-    )
-
-
 def largest_bend(interface, points, legs):
     """Largest distance of the stress between points of later legs from the straight line, relative to the largest."""
     stress, bend = interface.stress, 0.0
@@ -53,26 +40,19 @@ def largest_bend(interface, points, legs):
             continue
         bonds, last = now.state.bonds, now.state.solution
         first = interface.equilibrium(Load.strain(before.state.solution.strain), bonds, before.after.lam[0]).solution
-        for share in (0.3, 0.8):
-            strain, lam = ((1 - share) * a + share * b for a, b in ((first.strain, last.strain), (first.lam, last.lam)))
-            # Where the path is straight the guess is the solution: only to confirm it costs little.
-            between = stress(interface.equilibrium(Load.strain(strain), bonds, lam).solution)
-            line = (1 - share) * stress(first) + share * stress(last)
-            bend = max(bend, np.abs(between - line).max() / scale)
+        strain, lam = (0.6 * a + 0.4 * b for a, b in ((first.strain, last.strain), (first.lam, last.lam)))
+        # Where the path is straight the guess is the solution: only to confirm it costs little.
+        between = stress(interface.equilibrium(Load.strain(strain), bonds, lam).solution)
+        bend = max(bend, np.abs(between - 0.6 * stress(first) - 0.4 * stress(last)).max() / scale)
     return bend
 
 
-# All legs of one cell, and each beside another cell.
-LEGS = [*(("square", legs) for legs in WAYPOINTS), *zip(list(FREE)[1:], WAYPOINTS, strict=True)]
-
-
 @pytest.mark.one_rank
-@pytest.mark.parametrize(("case", "legs"), LEGS)
+@pytest.mark.parametrize(("case", "legs"), [*zip(list(FREE)[1:], WAYPOINTS, strict=True)])
 def test_free_fibres_are_straight_between_points(torn, case, legs):
     cell, waypoints = torn(**FREE[case]), WAYPOINTS[legs]
-    interface, begin = interface_with(cell, True)
-    solves = cell.solver.solves
-    points = list(events(CoupledInterfaces(interface), NEVER, strains(np.array(waypoints)), begin))
+    interface, solves = torn_cells.interface(cell, True), cell.solver.solves
+    points = followed(interface, NEVER, waypoints, True)
     solves = cell.solver.solves - solves
     assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
@@ -85,9 +65,9 @@ def test_free_fibres_are_straight_between_points(torn, case, legs):
 def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     cell = torn_cells.tear(comm, **THREE)
     fibre = cell.solver.jump_operator.nodes.fibre
-    interface, begin = interface_with(cell, fibre != comm.allreduce(fibre.min(initial=1000), min))
-    waypoints = np.array([[0.05, 0.05, 0.0], [-0.05, -0.02, 0.03], [0.6, -0.3, 0.1], [-0.8, -0.2, 0.0]])
-    points = list(events(CoupledInterfaces(interface), MaxStrength(20.0, 30.0), strains(waypoints), begin))
+    interface, debonded = torn_cells.interface(cell, True), fibre != comm.allreduce(fibre.min(initial=1000), min)
+    waypoints = [[0.05, 0.05, 0.0], [-0.05, -0.02, 0.03], [0.6, -0.3, 0.1], [-0.8, -0.2, 0.0]]
+    points = followed(interface, MaxStrength(20.0, 30.0), waypoints, debonded)
     assert sum(p.broke for p in points[1:]) > 3
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
 
@@ -95,10 +75,8 @@ def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
 def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
     material = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, plane="stress", decomposition=PIECES, **material)
-    interface, begin = interface_with(cell, False)
-    waypoints = np.array([[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]])
-    solves = cell.solver.solves
-    points = list(events(CoupledInterfaces(interface), MaxStrength(4.0, 3.0), strains(waypoints), begin))
+    waypoints, solves = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]], cell.solver.solves
+    points = followed(torn_cells.interface(cell, True), MaxStrength(4.0, 3.0), waypoints)
     assert len(points) > 30 and points[-1].load_factor == 1.0
     # A state at each change or break, one past it, and one ahead, with a pivot now and then: no halvings.
     assert cell.solver.solves - solves < 3.5 * len(points)
@@ -106,10 +84,8 @@ def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
 
 def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(torn):
     cell = torn(**FREE["square"])
-    interface, begin = interface_with(cell, True)
-    tension, turn, pressed = events(
-        CoupledInterfaces(interface), NEVER, strains(np.array(WAYPOINTS["through zero"])), begin
-    )
+    interface = torn_cells.interface(cell, True)
+    tension, turn, pressed = followed(interface, NEVER, WAYPOINTS["through zero"], True)
     assert [tension.load_factor, pressed.load_factor] == [0.5, 1.0]
     assert abs(turn.load_factor - 0.75) < 1e-9 and np.abs(turn.state.solution.strain).max() < 1e-9
     # On both sides the response is proportional to the strain, with the stiffnesses of a void and of a contact.
@@ -118,10 +94,7 @@ def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(torn):
 
 
 def test_faces_that_touch_without_force_hold_nothing(torn):
-    cell = torn(**FREE["square"])
-    interface, begin = interface_with(cell, True)
-    waypoints = np.array([[-0.05, -0.05, 0.0], [0.0, 0.0, 0.0]])
-    pressed, unloaded_again = (
-        p for p in events(CoupledInterfaces(interface), NEVER, strains(waypoints), begin) if p.after.position == 0
-    )
+    interface = torn_cells.interface(torn(**FREE["square"]), True)
+    points = followed(interface, NEVER, [[-0.05, -0.05, 0.0], [0.0, 0.0, 0.0]], True)
+    pressed, unloaded_again = (point for point in points if point.after.position == 0)
     assert [pressed.state.free_motions, unloaded_again.state.free_motions] == [1, 3]

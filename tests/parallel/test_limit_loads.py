@@ -92,11 +92,8 @@ def test_the_last_load_that_is_carried_is_carried(comm, shared_path, laminate):
     assert all(p.friction_heat < 1e-15 for p in points)
 
 
-SEEDS = [(seed, loose) for seed in range(3) for loose in (False, True)]
-
-
 @pytest.mark.one_rank
-@pytest.mark.parametrize(("seed", "loose"), SEEDS)
+@pytest.mark.parametrize(("seed", "loose"), [(0, True), (1, False), (2, True)])
 def test_columns_carry_the_shear_of_a_linear_programme(comm, shared_path, seed, loose):
     """Layers and loose blocks at 0.5 to 2 times their capacity, either sign, with unlike mu, by events and steps."""
     rng = np.random.default_rng(seed)

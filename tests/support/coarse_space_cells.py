@@ -25,17 +25,17 @@ SINGLE = 2e-6
 
 
 class Narrow:
-    """The narrow cell at one threshold, its dense dual problem, and preconditioners as dense matrices.
+    """The narrow cell, its dense dual problem, and preconditioners as dense matrices.
 
     These are the preconditioner without coarse space, M, that of dense modes, and what the program applies, H.
     """
 
-    def __init__(self, threshold, dense=None):
-        """Solve the dense dual problem, which does not depend on the threshold.  Collective."""
-        self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
+    def __init__(self):
+        """Solve the dense dual problem.  Collective."""
+        self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW)
         self.solver = self.cell.solver
         self.coarse = self.solver.adaptive
-        self.dense = dense or dense_feti.DenseDual(self.cell)
+        self.dense = dense_feti.DenseDual(self.cell)
         self.all = np.ones(self.dense.total, bool)
         self.M = self.dense.preconditioner(self.all)
         self.H = dense_feti.matrix(self.cell, self.solver.preconditioner.apply)

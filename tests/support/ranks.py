@@ -22,6 +22,15 @@ def write_once(comm: Any, mesh: Any, path: Path) -> None:
     comm.barrier()
 
 
+def told_once(comm: Any, capsys: Any, *words: str) -> str:
+    """Check that rank 0 alone has printed an error, in one line with these words; return stdout. Collective."""
+    output, errors = capsys.readouterr()
+    lines = errors.splitlines()
+    good = len(lines) == 1 and lines[0].startswith("error: ") and all(each in lines[0] for each in words)
+    parallel_assert(comm, good if comm.rank == 0 else not lines, errors)
+    return str(output)
+
+
 def assert_certified(comm: Any, folder: Path) -> None:
     """Check that the result in a folder obeys every law of `feti-homog verify`. Collective."""
     certificate = verify(folder) if comm.rank == 0 else None
