@@ -91,6 +91,7 @@ def test_layers_part_close_and_part_again_exactly(comm, shared_path, name):
     assert_certified(comm, shared_path / "out")
 
 
+@pytest.mark.one_rank
 def test_a_loss_at_parting_that_is_none_is_noticed(comm, shared_path):
     solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
 

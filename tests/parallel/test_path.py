@@ -90,6 +90,7 @@ def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterio
     assert [p.broke for p in points] == [e.broke.sum() for e in expected]
 
 
+@pytest.mark.few_ranks
 def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built):
     """Unloaded, reversed and loaded again."""
     case = built(**PHASES, **SQUARE)

@@ -114,12 +114,13 @@ def test_a_moved_and_a_turned_cell_have_the_same_stresses(comm, shared_path):
                 np.testing.assert_allclose(back[name](place), getattr(expected, f"{measure}_at"), atol=1e-6)
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_all_ranks_find_values_and_positions_of_one(comm, order):
+def test_all_ranks_find_values_and_positions_of_one(comm):
     """Interfaces keep the fibre a subdomain of its own; the load is skew, so that no two positions are alike."""
+    if comm.size == 1:
+        pytest.skip("one rank is alone")
     load, interface = {"E11": 0.01, "gamma12": 0.004}, {"normal_stiffness": 2000.0, "tangential_stiffness": 900.0}
-    together = phases_of(comm, load, order, interface=interface)
-    alone = phases_of(MPI.COMM_SELF, load, order, interface=interface)
+    together = phases_of(comm, load, 2, interface=interface)
+    alone = phases_of(MPI.COMM_SELF, load, 2, interface=interface)
     for phase, one in zip(together.values(), alone.values(), strict=True):
         for name in ("principal", "von_mises", "hydrostatic"):
             np.testing.assert_allclose(getattr(phase, name), getattr(one, name), rtol=1e-6)

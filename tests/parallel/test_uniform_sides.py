@@ -31,11 +31,11 @@ ARCS = {"debonded": [{"fibre": "all", "centre": 40.0, "angle": 130.0}], "contact
 BONDS = {"rigid": None, "springs": SPRINGS, "arcs": ARCS, "both": SPRINGS | ARCS}
 
 
-def discs(comm, path, seed, **options):
+def discs(comm, path, seed, count=9, **options):
     """Write a mesh with unmatched sides, at which fibres are cut.  Collective."""
     if comm.rank == 0:
         options = {"size": 0.15, "several": SEVERAL, "origin": (2.0, -3.0)} | options
-        write_discs(path, discs_in(1.0, 1.0, 9, RADIUS, seed), RADIUS, **options)
+        write_discs(path, discs_in(1.0, 1.0, count, RADIUS, seed), RADIUS, **options)
     comm.barrier()
     return path
 

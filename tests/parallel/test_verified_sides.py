@@ -49,7 +49,7 @@ def test_verified(comm, shared_path, boundary, bonds):
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_verified_on_refined_curves_in_contact(comm, shared_path, boundary):
     """Errors from the coarser mesh; faces that touch under one sign of the load, each by its own tractions."""
-    mesh = discs(comm, shared_path / "cell.msh", 3, order=2, size=0.3)
+    mesh = discs(comm, shared_path / "cell.msh", 3, count=3, order=2)
     options = {"cell": {"order": 2, "refine": 1}, "output": {"pictures": False}, "decomposition": {"subdomains": 9}}
     case = document(mesh, boundary, ARCS | {"contact": True}, fibre=CARBON, **options)
     result = run(Case.parse(case), comm, out=shared_path / "out")
