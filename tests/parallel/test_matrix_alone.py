@@ -16,8 +16,7 @@ INFLUENCE = {"feti_pc_type": "influence"}
 ENERGY = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "criterion": "energy", "toughness": 1.0}
 
 
-@pytest.mark.parametrize("petsc", [None, INFLUENCE], ids=["default", "influence"])
-@pytest.mark.parametrize("by_energy", [False, True], ids=["stiffness", "path"])
+@pytest.mark.parametrize(("petsc", "by_energy"), [(None, False), (INFLUENCE, True)], ids=["stiffness", "path"])
 def test_a_cell_of_matrix_alone_obeys_every_law(comm, shared_path, petsc, by_energy):
     write_once(comm, replace(layers("MMM", 0), names={MATRIX: "matrix"}), shared_path / "matrix.msh")
     analysis = {"path": {"to": {"E11": 0.1}}, "interface": ENERGY} if by_energy else {"stiffness": None}

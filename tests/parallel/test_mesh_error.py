@@ -19,11 +19,6 @@ ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "ang
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0e-6}
 SIZES = {1: 0.05, 2: 0.1}
-CASE = {
-    "cell": {"geometry": "square", "fibre_fraction": 0.4},
-    "material": {"matrix": MATRIX, "fibre": FIBRE},
-    "analysis": {"type": "stiffness", "plane": "strain"},
-}
 VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
 
 

@@ -34,7 +34,6 @@ CELLS = [
     HEXAGONAL | {"bodies": "plane", "decomposition": {"subdomains": 7}} | INFLUENCE,
     THREE,
 ]
-NAMES = dict(zip(("square", "stress", "hexagonal", "three"), CELLS, strict=True))
 TENSION, MIXED, SHEAR = [1.0, 0.1, 0.2], [0.6, -0.8, 0.3], [0.2, -0.1, 1.0]
 
 
@@ -44,15 +43,8 @@ def intact(cell):
 
 def follow(cell, contact, law, waypoints, begin=None):
     """All points of an events path from the wholly bonded cell."""
-    interface = torn_cells.interface(cell, contact)
-    return list(
-        events(
-            CoupledInterfaces(interface),
-            law,
-            strains(np.array(waypoints)),
-            begin or unloaded(CoupledInterfaces(interface), intact(cell)),
-        )
-    )
+    loaded = CoupledInterfaces(torn_cells.interface(cell, contact))
+    return list(events(loaded, law, strains(np.array(waypoints)), begin or unloaded(loaded, intact(cell))))
 
 
 def curve(cell, points):
@@ -69,15 +61,15 @@ def is_certified(points):
     return all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
 
 
-# Each cell with both criteria, each criterion with and without contact.
+# Each criterion with and without contact.
 ASKED = [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)]
 
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("cell", "criterion", "contact", "strain"),
-    [(cell, *ASKED[(number + turn) % 4]) for number, cell in enumerate(CELLS) for turn in (0, 1)],
-    ids=lambda value: next((name for name, cell in NAMES.items() if value is cell), None),
+    [(cell, *asked) for cell, asked in zip(CELLS, ASKED, strict=True)],
+    ids=["square", "stress", "hexagonal", "three"],
 )
 def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterion, contact, strain):
     case = built(**PHASES, **cell)
@@ -98,10 +90,11 @@ def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterio
     assert [p.broke for p in points] == [e.broke.sum() for e in expected]
 
 
-@pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
-def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built, back):
+@pytest.mark.few_ranks
+def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built):
+    """Unloaded, reversed and loaded again."""
     case = built(**PHASES, **SQUARE)
-    legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
+    legs = np.array([[0.3, -0.4, 0.15], [0.0, 0.0, 0.0], [-0.6, 0.8, -0.3], [0.9, -0.9, 0.7]])
     expected = on_root(comm, lambda: SlowLoadPath(case.reference, True, 0.15, 0.3, "max").legs(legs, 12))
     points = follow(case.cell, True, MaxStrength(0.15, 0.3), legs)
     assert is_certified(points)
@@ -109,27 +102,18 @@ def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built
     assert turns
     points = [p for p in points if p.broke or p.after.position == 0]
     assert len(points) == len(expected) > 8
-    assert is_certified(points)
     np.testing.assert_array_equal(broken(case, points), np.cumsum([e.broke for _, e in expected], axis=0) > 0)
     wanted = np.array([[load, *e.stress] for load, e in expected])
     assert np.abs(curve(case.cell, points) - wanted).max() < 1e-5 * np.abs(wanted[:, 1:]).max()
-    if not np.any(back):
-        unloaded_at = [p for p in points if p.load_factor == 2 / 3 and p.broke == 0]
-        assert len(unloaded_at) == 1
-        assert (torn_cells.stress(case.cell, unloaded_at[0].state.solution) == 0).all()
+    (at_zero,) = (p for p in points if p.load_factor == 1 / 2 and p.broke == 0)
+    assert (torn_cells.stress(case.cell, at_zero.state.solution) == 0).all()
 
 
 def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.07, refine=1, decomposition=PIECES)
     interface = torn_cells.interface(cell, True)
-    first = next(
-        events(
-            CoupledInterfaces(interface),
-            MaxStrength(0.1, 0.1),
-            strains(np.eye(3)[:1]),
-            unloaded(CoupledInterfaces(interface), intact(cell)),
-        )
-    )
+    loaded = CoupledInterfaces(interface)
+    first = next(events(loaded, MaxStrength(0.1, 0.1), strains(np.eye(3)[:1]), unloaded(loaded, intact(cell))))
     stress = first.scale * torn_cells.stress(cell, first.state.solution)
     assert np.abs(np.r_[first.load_factor, stress[:2]] / ONSET.value - 1).max() < 1e-3
     normal, shear = interface.traction(first.state.solution).T
@@ -141,55 +125,21 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     parallel_assert(comm, bool((np.minimum(np.abs(away), 180 - np.abs(away))[largest] < 5).all()))
 
 
-@pytest.mark.parametrize("contact", [True, False])
-def test_bonds_never_heal_and_every_break_dissipates(built, contact):
-    case = built(**THREE)
-    points = follow(case.cell, contact, QuadraticStrength(20.0, 30.0), [SHEAR])
-    after = broken(case, points)
-    assert (after[1:] >= after[:-1]).all()
-    for before, now in pairwise(points):
-        drop = torn_cells.stress(case.cell, before.state.solution) - torn_cells.stress(case.cell, now.state.solution)
-        assert drop @ SHEAR > -1e-9 * np.abs(drop).max()
-
-
 @pytest.mark.one_rank
 def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(torn):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
     cell = torn(**SQUARE)
     law, strain = MaxStrength(0.05, 0.05), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
-    interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
-    begin = unloaded(CoupledInterfaces(interface), intact(cell))
+    loaded, loads, errors = CoupledInterfaces(torn_cells.interface(cell, True)), np.linspace(0, 1, 20001), []
     for steps in (10, 40):
-        found = curve(cell, list(increments(CoupledInterfaces(interface), law, strains(strain), steps, True, begin)))[
-            :, :2
-        ]
+        begin = unloaded(loaded, intact(cell))
+        found = curve(cell, list(increments(loaded, law, strains(strain), steps, True, begin)))[:, :2]
         assert relative_error(found[:, 1], rising(exact, found[:, 0])) < 1e-7
         errors.append(np.abs(np.interp(loads, *np.vstack([[0, 0], found]).T) - rising(exact, loads)).mean())
     # A drop within a step h is smeared over it: an error of between a quarter and a half of the drop times h.
     constants = np.array(errors) * [10, 40]
     assert constants.max() < 2.1 * constants.min()
-
-
-@pytest.mark.one_rank
-def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
-    cell = torn(**SQUARE)
-    law, strain = MaxStrength(0.05, 0.05), np.array([[1e-3, 0.0, 0.0]])
-    interface, exact = torn_cells.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
-    for steps in (10, 40):
-        points = list(
-            increments(
-                CoupledInterfaces(interface),
-                law,
-                strains(strain),
-                steps,
-                False,
-                unloaded(CoupledInterfaces(interface), intact(cell)),
-            )
-        )
-        onset = next(p.load_factor for p in points if p.broke)
-        assert 0 <= onset - exact < 1 / steps
-        assert [p.load_factor for p in points] == pytest.approx(np.arange(1, steps + 1) / steps)
 
 
 def rising(exact, loads):
@@ -204,7 +154,7 @@ def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     law, waypoints = MaxStrength(20.0, 30.0), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
     points = follow(case.cell, True, law, waypoints)
     whole, sets = curve(case.cell, points), broken(case, points)
-    for k in range(0, len(points) - 1, max(1, len(points) // 6)):
+    for k in range(0, len(points) - 1, max(1, len(points) // 3)):
         rest = follow(case.cell, True, law, waypoints, points[k].after)
         assert relative_error(curve(case.cell, rest), whole[k + 1 :]) < 1e-7
         np.testing.assert_array_equal(broken(case, rest), sets[k + 1 :])
@@ -215,9 +165,9 @@ def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
 def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}
     cell = torn_cells.tear(comm, **SQUARE, **loose)
-    interface, law = torn_cells.interface(cell, True), MaxStrength(1e-3, 1e-3)
-    begin = unloaded(CoupledInterfaces(interface), intact(cell))
-    (point,) = increments(CoupledInterfaces(interface), law, strains(np.array([MIXED])), 4, worst_only, begin)
+    loaded, law = CoupledInterfaces(torn_cells.interface(cell, True)), MaxStrength(1e-3, 1e-3)
+    begin = unloaded(loaded, intact(cell))
+    (point,) = increments(loaded, law, strains(np.array([MIXED])), 4, worst_only, begin)
     assert point.state.solution.reason < 0 and point.broke == 0
 
 
@@ -226,16 +176,8 @@ def test_infinite_strengths_never_break(torn):
     points = follow(cell, True, QuadraticStrength(np.inf, np.inf), [TENSION, SHEAR])
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     status = np.full(len(intact(cell).status), OPEN, np.int8)
-    interface = torn_cells.interface(cell, True)
-    points = list(
-        events(
-            CoupledInterfaces(interface),
-            MaxStrength(1.0, 1.0),
-            strains(np.array([SHEAR, MIXED])),
-            unloaded(CoupledInterfaces(interface), torn_cells.bonds(status)),
-        )
-    )
-    points = [p for p in points if p.after.position == 0]
+    begin = unloaded(CoupledInterfaces(torn_cells.interface(cell, True)), torn_cells.bonds(status))
+    points = [p for p in follow(cell, True, MaxStrength(1.0, 1.0), [SHEAR, MIXED], begin) if p.after.position == 0]
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     assert is_certified(points)
 

@@ -41,10 +41,10 @@ POLICIES = {
 }
 
 
-@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES)
-@pytest.mark.parametrize("cell", CELLS.values(), ids=CELLS)
+@pytest.mark.parametrize(("cell", "policy"), [("linear", "whole"), *((cell, "pieces") for cell in CELLS)])
 def test_stiffness_is_the_monolithic_one(comm, cell, policy):
-    torn, L, responses = solve(make_case(**RANDOM | cell), comm, policy=policy)
+    policy = POLICIES[policy]
+    torn, L, responses = solve(make_case(**RANDOM | CELLS[cell]), comm, policy=policy)
     assert torn.summary.across and (torn.summary.subdomains == comm.size or not policy.whole_dofs)
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-8
     assert max(max(r.checks.values()) for r in responses) < 1e-7
@@ -121,18 +121,6 @@ def document(cut):
     }  # fmt: skip
 
 
-def test_runs_give_what_they_give_by_bodies(comm):
-    across, bodies = (plain(run(Case.parse(document(cut)), comm)) for cut in ("auto", "bodies"))
-    assert across["solver"]["subdomains"] == comm.size < bodies["solver"]["subdomains"]
-    assert across["solver"]["interface_nodes"] == bodies["solver"]["interface_nodes"] > 0
-    for name in ("fractions", "elements", "area"):
-        assert across["cell"][name] == pytest.approx(bodies["cell"][name], rel=1e-12)
-    for name in ("effective_stiffness", "thermal_expansion"):
-        np.testing.assert_allclose(across[name], bodies[name], atol=1e-9 * np.abs(bodies[name]).max())
-    # Stresses are recovered within pieces, and of bodies from a coarser mesh.
-    assert across["mesh_error"]["energy"] == pytest.approx(bodies["mesh_error"]["energy"], rel=0.3)
-
-
 def test_load_counts_the_bonds_that_it_counts_by_bodies(comm):
     load = {"analysis": {"type": "load", "plane": "generalized"}, "load": {"to": {"E11": 0.01}}}
     across, bodies = (run(Case.parse(document(cut) | load), comm) for cut in ("auto", "bodies"))
@@ -171,9 +159,7 @@ def test_phases_of_very_different_stiffness_stay_apart(comm, young):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
-@pytest.mark.parametrize(
-    ("plane", "fibre"), [("generalized", "glass"), ("stress", "glass"), ("generalized", "carbon"), ("strain", "carbon")]
-)
+@pytest.mark.parametrize(("plane", "fibre"), [("generalized", "glass"), ("stress", "glass"), ("generalized", "carbon")])
 def test_fields_and_derivatives_are_those_by_bodies(comm, plane, fibre):
     asked = {"output": {"sensitivities": True}, "analysis": {"type": "stiffness", "plane": plane}}
     runs = [document(cut) | asked for cut in ("auto", "bodies")]
@@ -184,9 +170,14 @@ def test_fields_and_derivatives_are_those_by_bodies(comm, plane, fibre):
             each["material"]["fibre"] = CARBON | expansion
     across, bodies = (run(Case.parse(each), comm, fields=True) for each in runs)
     assert across.solver.subdomains == comm.size < bodies.solver.subdomains
-    expected = bodies.effective_stiffness
-    np.testing.assert_allclose(across.effective_stiffness, expected, atol=1e-9 * np.abs(expected).max())
-    assert across.mesh_error.energy == pytest.approx(bodies.mesh_error.energy, rel=0.5)
+    assert across.solver.interface_nodes == bodies.solver.interface_nodes > 0
+    for name in ("fractions", "elements", "area"):
+        assert getattr(across.cell, name) == pytest.approx(getattr(bodies.cell, name), rel=1e-12)
+    for name in ("effective_stiffness", *(["thermal_expansion"] if plane == "generalized" else [])):
+        ours, expected = (np.asarray(getattr(result, name)) for result in (across, bodies))
+        np.testing.assert_allclose(ours, expected, atol=1e-9 * np.abs(expected).max())
+    # Stresses are recovered within pieces, and of bodies from a coarser mesh.
+    assert across.mesh_error.energy == pytest.approx(bodies.mesh_error.energy, rel=0.3 if fibre == "glass" else 0.5)
     values = across.sensitivities.derivatives, bodies.sensitivities.derivatives
     np.testing.assert_allclose(*values, rtol=1e-7, atol=1e-9 * np.abs(values[1]).max())
     names = ["traction", "jump", "displacement_matrix", *(["axial_traction"] if plane == "generalized" else [])]

@@ -1,15 +1,12 @@
 """L^ef of tables with rounded polygons: a monolithic solve, circles, a user's mesh of a square, laws."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from support.cases import case_of, monolithic_stiffness, relative_error, solve
 from support.ranks import assert_certified, write_once
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import run
-from feti_homog.case import cases
 
 pytestmark = pytest.mark.parallel
 
@@ -22,17 +19,6 @@ ROWS = [
 ]
 
 
-def case_of(cell, folder=None, **sections):
-    document = {
-        "cell": cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": 1e-11},
-        "output": {"pictures": False},
-    }
-    return cases.parse(document | sections, Path() if folder is None else folder)
-
-
 def table(*rows, **keys):
     return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": list(rows), "mesh_size": 0.1} | keys
 
@@ -43,7 +29,8 @@ def stiffness(comm, *rows, **keys):
 
 @pytest.mark.quick
 @pytest.mark.parametrize(
-    ("keys", "pieces"), [({"refine": 1}, {}), ({"order": 2}, {"decomposition": {"subdomains": 9}})]
+    ("keys", "pieces"),
+    [({"refine": 1}, {}), ({"order": 2}, {"decomposition": {"subdomains": 9}})],
 )
 def test_torn_polygons_have_the_monolithic_stiffness(comm, keys, pieces):
     torn, L, responses = solve(case_of(table(*ROWS, **keys), **pieces), comm)

@@ -53,8 +53,7 @@ def two_inclusions(softness, stiff, soft, unit=1.0, young=10.0, **analysis):
     )
 
 
-@pytest.mark.parametrize("softness", [1e-10, 1e-13])
-def test_interfaces_far_apart_break_at_the_same_loads(comm, softness):
+def test_interfaces_far_apart_break_at_the_same_loads(comm):
     """On springs far stiffer than the soft fibre, what breaks release is as small as its stiffness."""
 
     def path(softness):
@@ -62,7 +61,7 @@ def test_interfaces_far_apart_break_at_the_same_loads(comm, softness):
         to = {"E11": 0.05, "E22": 0.02, "gamma12": 0.02}
         return run(two_inclusions(softness, *bonds, path={"to": to}), comm).path
 
-    expected, found = path(1e-8), path(softness)
+    expected, found = path(1e-8), path(1e-13)
     assert len(found) == len(expected) > 15
     for one, other in zip(found, expected, strict=True):
         assert one.load_factor == pytest.approx(other.load_factor, rel=3e-6)
@@ -226,8 +225,7 @@ def test_springs_too_soft_beside_a_cut_fibre_are_refused(comm):
         softly_held(comm, 1e-16, 1e6, 2, **pieces)
 
 
-@pytest.mark.parametrize("stiffness", [1e-9, 1e-12])
-def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm, stiffness):
+def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm):
     """Its forces are found on the side of the matrix, theirs on that of the fibre."""
 
     def path(k):
@@ -237,7 +235,7 @@ def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm, stiffness):
         case = two_inclusions(1e-6, *bonds, young=1e6, path={"to": {"E11": 0.2, "gamma12": 0.1}})
         return [point.load_factor for point in run(case, comm).path]
 
-    expected, found = path(1e-6), path(stiffness)
+    expected, found = path(1e-6), path(1e-12)
     assert found == pytest.approx(expected, rel=3e-5) and len(found) > 10
 
 

@@ -7,8 +7,6 @@ import pytest
 from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, CaseError, run
-from feti_homog.studies.uncertain_numbers import Uncertainty
-from feti_homog.system.runtime.records import plain
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -184,26 +182,3 @@ def test_an_envelope_has_none():
     case["analysis"]["type"] = "envelope"
     with pytest.raises(CaseError, match=r"\[output\] sensitivities = true: belongs to .*stiffness"):
         Case.parse(case)
-
-
-def test_they_are_not_computed_unasked(comm):
-    case = copy.deepcopy(CASES["debonded"])
-    del case["output"]["sensitivities"]
-    assert "sensitivities" not in plain(run(Case.parse(case), comm))
-
-
-def test_scatter_of_constants_is_that_of_samples_of_the_linear_cell(comm):
-    """The expansion of first order in samples of correlated inputs; shares add up to one."""
-    case = document(PLAIN | {"order": 1}, "strain", {"matrix": dict(MATRIX), "fibre": dict(FIBRE)})
-    sizes = {"material.matrix.young": 4.0, "material.fibre.young": 9.0, "material.fibre.poisson": 0.02}
-    pair = ("material.matrix.young", "material.fibre.young", 0.6)
-    slopes = run(Case.parse(case), comm).sensitivities
-    covariance = np.diag(np.array([*sizes.values()]) ** 2)
-    covariance[0, 1] = covariance[1, 0] = 0.6 * 4.0 * 9.0
-    samples = np.random.default_rng(3).multivariate_normal(np.zeros(3), covariance, 20000)
-    J = slopes.derivatives[:, [slopes.parameters.index(name) for name in sizes]]
-    scatter = (samples @ J.T).std(axis=0)
-    std, shares = Uncertainty(sizes, (pair,)).propagated(J)
-    large = std > 1e-9 * std.max()
-    assert std[large] == pytest.approx(scatter[large], rel=0.02)
-    assert shares[large].sum(axis=1) == pytest.approx(1.0)

@@ -18,6 +18,7 @@ from feti_homog.interface.loads import Load
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 UNIT = np.eye(3)
+PIECES = [{}, {"subdomains": 12}]
 
 
 def bonded_responses(cell):
@@ -49,14 +50,6 @@ def test_curved_elements_reach_the_published_numbers(comm, key):
     assert errors(comm, key, order=2, mesh_size=0.1, refine=refine).max() < 2e-6
 
 
-@pytest.mark.one_rank
-@pytest.mark.parametrize("key", [("square", 500, 500), ("hexagonal", 10, 2.5)], ids=str)
-def test_linear_elements_converge_to_them(comm, key):
-    coarse, fine = (errors(comm, key, order=1, mesh_size=0.1, refine=refine) for refine in (1, 3))
-    assert fine.max() < 2e-3
-    assert np.log2(coarse.max() / fine.max()) > 2 * 1.8
-
-
 def solutions(cell, solver, compliance):
     """Multipliers and jumps under the unit strains with all bonds but every seventh of this rank, and iterations."""
     nodes = solver.jump_operator.nodes
@@ -69,7 +62,7 @@ def solutions(cell, solver, compliance):
 
 
 @pytest.mark.parametrize("preconditioner", ["dirichlet", "influence", "lumped"])
-@pytest.mark.parametrize("pieces", [{}, {"subdomains": 12}], ids=["whole", "cut"])
+@pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
 def test_springs_that_soften_are_those_that_were_soft_from_the_beginning(comm, monkeypatch, preconditioner, pieces):
     """Springs of twice the compliance, set after a solve with the first; then all as at first."""
     case = {
@@ -98,9 +91,6 @@ def test_springs_that_soften_are_those_that_were_soft_from_the_beginning(comm, m
         assert needed <= (1 if preconditioner == "influence" else iterations + 2)
 
 
-PIECES = [{}, {"subdomains": 12}]
-
-
 @pytest.mark.quick
 @pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
 @pytest.mark.parametrize("preconditioner", ["dirichlet", "influence"])
@@ -109,7 +99,7 @@ def test_iterations_hardly_depend_on_the_springs(comm, preconditioner, pieces):
     case["petsc"] = {"feti_pc_type": preconditioner, "feti_dual_operator": "explicit"}
     glued, _, few = stiffness(comm, **case)
     last = glued
-    for k in (1e12, 1e4, 1e2, 1.0, 0.1):
+    for k in (1e12, 1e2, 0.1):
         L, worst, iterations = stiffness(comm, springs=(k, k / 4), **case)
         assert worst < 1e-5 and iterations <= max(2 * few, 1 + few)
         assert (np.linalg.eigvalsh(last - L) > -1e-9 * np.abs(L).max()).all()
@@ -132,7 +122,7 @@ def test_a_neutral_fibre_is_not_seen(comm):
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", range(2))
 def test_random_cells_equal_the_quadratic_programme(comm, number):
     rng = np.random.default_rng([comm.size, number, 7])
     springs = tuple(10.0 ** rng.uniform(-2, 3, size=2))
@@ -165,15 +155,6 @@ def test_one_stiffness_alone_may_be_finite(comm):
     stiff, *_ = stiffness(comm, springs=(1e12, 1e-6), **case)
     assert relative_error(sliding, stiff) < 1e-7
     assert VOID["square"].value[0] < sliding[0, 0] < glued[0] and sliding[2, 2] < glued[2]
-
-
-@pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
-def test_very_stiff_springs_are_glue(comm, pieces):
-    cell = {"geometry": "square", "mesh_size": 0.15, "order": 2} | ({"decomposition": pieces} if pieces else {})
-    stiff = 1e10 * FIBRE["young"]
-    L, worst, _ = stiffness(comm, **cell, springs=(stiff, stiff))
-    glued, _, _ = stiffness(comm, **cell)
-    assert relative_error(L, glued) < 1e-8 and worst < 1e-5
 
 
 @pytest.mark.parametrize("dual_operator", ["explicit", "implicit"])

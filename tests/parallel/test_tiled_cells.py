@@ -2,17 +2,15 @@
 
 from dataclasses import fields
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support import torn_cells
+from support import cases, torn_cells
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 from support.loads import strains
 from support.whole_meshes import coarse_mesh
 
-from feti_homog.case import cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import tile_tearing
 from feti_homog.homogenization.domain_partition import distribute
@@ -40,26 +38,19 @@ KINDS = {
 }
 
 
-def case_of(interface=None, decomposition=None, **keys):
-    document = {
-        "cell": {"geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "mesh_size": 0.08, **keys},
-        "material": {"matrix": MATRIX, "fibre": FIBRE} | ({"coating": FIBRE} if "coating" in keys else {}),
-        **({"interface": interface} if interface else {}),
-        "decomposition": decomposition or {},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": 1e-11},
-        "output": {"pictures": False},
-    }
-    return cases.parse(document, Path())
+def case_of(cell=(), **sections):
+    cell = {"geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "mesh_size": 0.08} | dict(cell)
+    coating = {"coating": FIBRE} if "coating" in cell else {}
+    return cases.case_of(cell, material={"matrix": MATRIX, "fibre": FIBRE} | coating, **sections)
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize("keys", [{}, {"interface_size": 0.01}], ids=["uniform", "fine interfaces"])
 def test_the_mesh_is_that_of_one_rank(comm, keys):
-    mesh = coarse_mesh(case_of(**keys), comm, SMALL)
+    mesh = coarse_mesh(case_of(keys), comm, SMALL)
     assert (mesh is None) == (comm.rank > 0)
     if mesh is not None:
-        alone = coarse_mesh(case_of(**keys), MPI.COMM_SELF, SMALL)
+        alone = coarse_mesh(case_of(keys), MPI.COMM_SELF, SMALL)
         for name in ("points", "triangles", "phase", "representative", "arc_edges"):
             assert np.array_equal(getattr(mesh, name), getattr(alone, name))
 
@@ -75,7 +66,7 @@ def share_of(case, comm):
 @pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
 def test_the_summary_is_that_of_the_whole_mesh(comm, keys):
     """But for the number of subdomains: here they end with the tiles."""
-    case = case_of(**keys)
+    case = case_of(keys)
     found = share_of(case, comm)
     (whole,) = distribute(case, coarse_mesh(case, MPI.COMM_SELF, SMALL), LATTICE, 1, TILED)
     for field in fields(found.summary):
@@ -94,7 +85,7 @@ def test_the_summary_is_that_of_the_whole_mesh(comm, keys):
 @pytest.mark.quick
 def test_subdomains_are_those_of_one_rank(comm):
     """Each has the same triangles, whoever filled its tile; an entity has the same sharers."""
-    case = case_of(**KINDS["coated, voids"], decomposition={"max_dofs": 500})
+    case = case_of(KINDS["coated, voids"], decomposition={"max_dofs": 500})
     own, alone = share_of(case, comm), share_of(case, MPI.COMM_SELF)
     assert np.array_equal(own.table.body, alone.table.body) and own.table.rank.max() == comm.size - 1
     expected = {submesh.index: submesh for submesh in alone.submeshes.cut()}
@@ -108,7 +99,7 @@ def test_subdomains_are_those_of_one_rank(comm):
 @pytest.mark.quick
 @pytest.mark.parametrize(("keys", "policy"), [(KINDS["plain"], ACROSS), (KINDS["coated, voids"], TILED)], ids=KINDS)
 def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys, policy):
-    cell, L, _ = solve(case_of(**keys, refine=1), comm, policy=policy)
+    cell, L, _ = solve(case_of(keys | {"refine": 1}), comm, policy=policy)
     assert cell.summary.across == (policy is ACROSS)
     assert relative_error(L, monolithic_stiffness(cell)) < 1e-9
 
@@ -133,20 +124,12 @@ def test_a_path_is_that_of_the_cell_torn_on_rank_0(comm):
 
 def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     contact = {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 90.0}], "contact": True}
-    for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
+    for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"cell": {"bodies": "plane"}}):
         case = case_of(**more)
         noded = tile_tearing.place_nodes(case, comm, SMALL)
         assert noded is None or not can_be_torn_by_tiles(case, noded, LATTICE, TILED)
     cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
     assert cell.summary.subdomains == 17
-
-
-@pytest.mark.few_ranks
-def test_the_stiffness_is_that_of_the_cell_meshed_at_once(comm):
-    """To the difference between two refinements of it."""
-    _, tiled, _ = solve(case_of(refine=1), comm, policy=TILED)
-    coarse, fine = (solve(case_of(refine=k), comm)[1] for k in (1, 2))
-    assert 0 < relative_error(tiled, coarse) < relative_error(coarse, fine)
 
 
 def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch):

@@ -76,7 +76,7 @@ def test_bonded_bodies_that_touch_are_one_solid(comm: Any, shared_path: Any, siz
 @pytest.mark.parametrize("debonded", [False, True])
 def test_symmetries_of_the_square_turn_the_response(comm: Any, shared_path: Any, debonded: bool):
     image, found = random_image(8, 2), []
-    for symmetry in SYMMETRIES:
+    for symmetry in (SYMMETRIES[0], SYMMETRIES[1], SYMMETRIES[4], SYMMETRIES[7]):  # as is, turned and mirrored
         mesh, T = pixel_mesh(image, symmetry=symmetry), turned(symmetry)
         if debonded:
             stress, _ = loaded(comm, shared_path, mesh, turned(symmetry, of_strain=True) @ STRAIN, {})

@@ -75,20 +75,17 @@ def test_traces_of_few_dofs_keep_them_all(torn):
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize(("pieces", "seeds"), [(17, [1]), (24, [4, 6])], ids=["whole", "cut"])
-def test_coarser_traces_find_as_good_modes(comm, pieces, seeds):
-    """At most two iterations more on the mean of cells; of nine cells that were cut it was 0 to 3, 1.9 on the mean."""
-    more = []
-    for seed in seeds:
-        found = []
-        for enough in (ALL, DEFAULTS.min_trace_dofs):
-            case = traced(enough, seed=seed, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
-            cell = torn_cells.tear(comm, **case)
-            solutions = solve_many(cell)
-            vectors = cell.solver.coarse_dimension
-            found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
-        (every, most, stress), (fewer, iterations, same) = found
-        more.append(iterations - most)
-        assert 0.8 * every <= fewer <= 1.05 * every
-        assert np.abs(np.subtract(same, stress)).max() < 1e-7 * np.abs(stress).max()
-    assert np.mean(more) <= 2
+@pytest.mark.parametrize(("pieces", "seed"), [(17, 1), (24, 4)], ids=["whole", "cut"])
+def test_coarser_traces_find_as_good_modes(comm, pieces, seed):
+    """At most two iterations more; of nine cells that were cut it was 0 to 3, 1.9 on the mean."""
+    found = []
+    for enough in (ALL, DEFAULTS.min_trace_dofs):
+        case = traced(enough, seed=seed, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
+        cell = torn_cells.tear(comm, **case)
+        solutions = solve_many(cell)
+        vectors = cell.solver.coarse_dimension
+        found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
+    (every, most, stress), (fewer, iterations, same) = found
+    assert iterations <= most + 2
+    assert 0.8 * every <= fewer <= 1.05 * every
+    assert np.abs(np.subtract(same, stress)).max() < 1e-7 * np.abs(stress).max()

@@ -192,21 +192,6 @@ def test_a_result_that_has_all_points_is_no_unfinished_path(comm, shared_path):
     assert len(on_root(comm, output_folder.latest, shared_path)["path"]) == EVENTS
 
 
-def test_a_record_that_is_being_written_does_not_count(comm, shared_path):
-    begun(comm, shared_path, CASE["path"])
-
-    def read() -> None:
-        path = shared_path / checkpoints.FOLDER / checkpoints.NAME
-        content = path.read_bytes()
-        path.write_bytes(content[:-1])
-        assert len(output_folder.latest(shared_path)["path"]) == EVENTS - 1
-        path.write_bytes(content[:-9] + bytes(9))
-        with pytest.raises(CaseError, match="checksum of record 6 is wrong"):
-            output_folder.latest(shared_path)
-
-    on_root(comm, read)
-
-
 @pytest.mark.one_rank
 def test_sweeps_tell_and_collect_begun_cases(comm, shared_path):
     """The second of two points is interrupted: the first alone has statistics."""

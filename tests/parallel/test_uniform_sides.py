@@ -33,11 +33,11 @@ ARCS = {"debonded": [{"fibre": "all", "centre": 40.0, "angle": 130.0}], "contact
 BONDS = {"rigid": None, "springs": SPRINGS, "arcs": ARCS, "both": SPRINGS | ARCS}
 
 
-def discs(comm, path, seed, **options):
+def discs(comm, path, seed, count=9, **options):
     """Write a mesh with unmatched sides, at which fibres are cut.  Collective."""
     if comm.rank == 0:
         options = {"size": 0.15, "several": SEVERAL, "origin": (2.0, -3.0)} | options
-        write_discs(path, discs_in(1.0, 1.0, 9, RADIUS, seed), RADIUS, **options)
+        write_discs(path, discs_in(1.0, 1.0, count, RADIUS, seed), RADIUS, **options)
     comm.barrier()
     return path
 
@@ -96,21 +96,22 @@ def reference(comm, case):
     return comm.bcast(answer)
 
 
-@pytest.mark.parametrize("pieces", [None, 11])
-@pytest.mark.parametrize(("order", "fibre"), [(1, GLASS), (2, CARBON)])
+@pytest.mark.parametrize(("order", "refine", "fibre", "pieces"), [(1, 1, GLASS, 11), (2, 0, CARBON, None)])
 @pytest.mark.parametrize("boundary", BOUNDARIES)
-def test_direct_solve_of_the_same_mesh(comm, shared_path, boundary, order, fibre, pieces):
+def test_direct_solve_of_the_same_mesh(comm, shared_path, boundary, order, refine, fibre, pieces):
     matrix = SOFT if order == 1 else TURNED
     more = {} if pieces is None else {"decomposition": {"subdomains": pieces}}
     mesh = discs(comm, shared_path / "cell.msh", 1, order=order)
-    case = Case.parse(document(mesh, boundary, matrix=matrix, fibre=fibre, cell={"order": order, "refine": 1}, **more))
+    case = Case.parse(
+        document(mesh, boundary, matrix=matrix, fibre=fibre, cell={"order": order, "refine": refine}, **more)
+    )
     result, (C, heat) = compute(case, comm), reference(comm, case)
     assert result.effective_stiffness == pytest.approx(C, rel=0, abs=1e-9 * np.abs(C).max())
     if "expansion" in matrix:
         assert result.thermal_stress == pytest.approx(heat, rel=0, abs=1e-9 * np.abs(heat).max())
 
 
-@pytest.mark.parametrize("bonds", ["springs", "arcs", "both"])
+@pytest.mark.parametrize("bonds", ["arcs", "both"])
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_bonds_inside(comm, shared_path, boundary, bonds):
     mesh = discs(comm, shared_path / "cell.msh", 2)
@@ -134,9 +135,8 @@ def test_stresses_without_amplitudes_are_complete(comm, shared_path):
     cell.destroy()
 
 
-@pytest.mark.parametrize("bonds", BONDS)
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_periodic_cells_lie_between(comm, shared_path, seed, bonds):
+@pytest.mark.parametrize(("bonds", "seed"), [("rigid", 1), ("springs", 2), ("arcs", 3), ("both", 1)])
+def test_periodic_cells_lie_between(comm, shared_path, bonds, seed):
     """Energies rise with fewer admissible displacements, in every load: differences are positive semidefinite."""
     mesh, random = shared_path / "cell.msh", np.random.default_rng(seed)
     if comm.rank == 0 and bonds in ("rigid", "springs"):
@@ -183,19 +183,3 @@ def test_ranks_and_units(comm, shared_path, boundary):
     pascals = {name: value * 1e6 / 1e3 for name, value in grown.items()} | {"contact": False}
     phases = {"matrix": SOFT | {"young": 1e6 * SOFT["young"]}, "fibre": GLASS | {"young": 1e6 * GLASS["young"]}}
     assert solved(comm, other, boundary, pascals, **phases) == pytest.approx(1e6 * C, rel=0, abs=1e-4 * np.abs(C).max())
-
-
-def test_cells_grow_towards_one_stiffness(comm, shared_path):
-    """Square arrays of 1, 4 and 16 fibres: both bounds close in on the periodic stiffness of all."""
-    gaps, expected = [], None
-    for n in (1, 2, 4):
-        mesh = shared_path / f"{n}.msh"
-        if comm.rank == 0:
-            places = (np.stack(np.meshgrid(range(n), range(n)), axis=-1).reshape(-1, 2) + 0.5) * 1.0
-            write_discs(mesh, places, 0.35, float(n), float(n), size=0.25, several=(4 * n,) * 4)
-        comm.barrier()
-        low, high = (solved(comm, mesh, boundary, plane="strain") for boundary in BOUNDARIES)
-        expected = solved(comm, mesh, "periodic", plane="strain") if n == 1 else expected
-        gaps.append((high - low)[0, 0])
-        assert low[0, 0] < expected[0, 0] * 1.01 and high[0, 0] > expected[0, 0] * 0.99
-    assert gaps[1] < 0.7 * gaps[0] and gaps[2] < 0.7 * gaps[1]

@@ -31,7 +31,7 @@ DOCUMENT = {
     "output": {"pictures": False},
     "petsc": {"feti_ksp_rtol": 1e-12, "feti_pc_type": "lumped"},
 }  # fmt: skip
-UNITS = 1.0, 3.0, 11.985837666469678, 7.7e-5, 1e17
+UNITS = 1.0, 11.985837666469678, 1e17
 
 
 @pytest.fixture

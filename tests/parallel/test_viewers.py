@@ -26,7 +26,6 @@ VOIGT = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 SPACE = {"S23": "column/state/K/S23", "S13": "column/state/K/S13"}
 SPACE_POINTS = {"traction_a": "state/K/axial_traction", "jump_a": "state/K/axial_jump"}
 CASES: dict[str, dict[str, Any]] = {
-    "stiffness": {"analysis": {"type": "stiffness", "plane": "stress"}},
     "angle": {
         "analysis": {"type": "angle", "plane": "strain"},
         "interface": {"debonded": [{"fibre": "all"}]},
@@ -35,11 +34,6 @@ CASES: dict[str, dict[str, Any]] = {
     "space": {
         "analysis": {"type": "stiffness", "plane": "generalized"},
         "interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}], "contact": False},
-    },
-    "path": {
-        "analysis": {"type": "path", "plane": "strain"},
-        "interface": {"normal_strength": 1.0},
-        "path": {"strain": STRAIN},
     },
 }
 

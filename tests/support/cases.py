@@ -35,6 +35,18 @@ def make_case(
     return cases.parse(document, Path(folder))
 
 
+def case_of(cell, folder=".", **sections):
+    """Return the stiffness of this cell section as a case, with other sections in place of the usual ones."""
+    document = {
+        "cell": cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "petsc": {"feti_ksp_rtol": 1e-11},
+        "output": {"pictures": False},
+    }
+    return cases.parse(document | sections, Path(folder))
+
+
 class Responses:
     """Takes the responses that are to be kept as states, in place of `StateRecorder`."""
 
