@@ -295,5 +295,5 @@ def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
 
 
 def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
-    """Rebuild a bond state from the arrays that `_bond_arrays` made."""
+    """Rebuild a bond state from the arrays that `_bond_arrays` made; absent arrays become None."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]

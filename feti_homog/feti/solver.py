@@ -51,7 +51,7 @@ class FetiSolver:
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         natural: rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
-        coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
+        coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.
         condition: largest estimated condition number of the preconditioned operator so far; 0 without iterations.

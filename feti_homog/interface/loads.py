@@ -208,7 +208,7 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,), or 0."""
+        """Return the ratio of the largest strain of a state (v,) to the largest of `asked` (v,); 0 if `asked` is 0."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:

@@ -215,7 +215,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Returns None unless as many pins exist, after `_restart` if the reference cell is old.
+        possible positions.  Returns None unless `free` pins exist; the cell is then factored anew if it has changed.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
