@@ -156,7 +156,7 @@ class Angle(AnalysisSection):
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves, with either contact: per opening one under `strain`, else one per unit load."""
+        """Return the number of solves: one per opening under `strain`, else one per opening and unit load."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 

@@ -113,7 +113,7 @@ def legs(document: Document) -> int:
 
 
 def first_leg(document: Document) -> int:
-    """Return the number of points on the first leg; for increments, of all points."""
+    """Return the number of points on the first leg, or of all points for increments."""
     points = document["path"]
     if document["case"]["path"]["method"] == "increments":
         return len(points)
