@@ -29,7 +29,7 @@ UNKNOWN = ("alpha", "broken", "certificate", "bond")  # arrays with NaN for miss
 class Work:
     """The energies per cell area up to a path point.
 
-    The loss in breaks is the work of the loads minus the stored energy.
+    The loss in breaks is the work of the loads minus the stored energy and the frictional heat.
 
     Attributes:
         all_equilibria: energies along all equilibria, where each bond breaks at its break load, with snap-back.

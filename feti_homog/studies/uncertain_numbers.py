@@ -51,7 +51,7 @@ class Uncertainty:
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers, and leave their means in the document; on faults, append lines and return none."""
+    """Extract the uncertain numbers, and leave their means in the document; append all faults to `faults`."""
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY

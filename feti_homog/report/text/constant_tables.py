@@ -132,7 +132,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of constants between bounds, with Reuss-Voigt violations marked; only a title without bounds."""
+    """Return a table of constants between bounds, with Reuss-Voigt violations marked; without bounds, only a title."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
