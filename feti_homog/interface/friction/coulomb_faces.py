@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses and x: from all sliding faces stuck, from one face stuck, then by trial."""
+        """Yield other admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
