@@ -55,7 +55,7 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """The first degree of freedom of each part in this rank's vectors, and their length."""
+        """The first degree of freedom of each part in this rank's vectors, and their length: (parts + 1,)."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property

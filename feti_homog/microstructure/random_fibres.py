@@ -222,6 +222,6 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, between a periodic pattern and a measured window."""
+    """Return the `match_distance`, in mean diameters, of N discs in a periodic cell from a measured window."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

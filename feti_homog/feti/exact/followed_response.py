@@ -59,7 +59,7 @@ class FollowedResponse:
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
-        """Return the global `rows` that have no column."""
+        """Return the global `rows` (k,) that have no column."""
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:

@@ -71,7 +71,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return the vertices as sources, with the distance to the next vertex on the torus as length."""
+    """Return vertices (v, 2) as sources, with the distance to the next vertex on the torus as length."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
