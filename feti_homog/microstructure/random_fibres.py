@@ -179,8 +179,8 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum; success is a clearance of at
-    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2; success is at least
+    1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
     reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)

@@ -262,6 +262,6 @@ class CoulombFaces(FaceSystem):
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of an implicit step: final friction forces times slips."""
+        """Return the heat of an implicit step: final friction forces times slips, at sliding nodes."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())
