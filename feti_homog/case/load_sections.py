@@ -88,7 +88,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """Return the index of the first load that names each component, by stress; len(loads) without such a load."""
+    """Return the index of the first load that names each component, by stress name; len(loads) without such a load."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components
