@@ -5,7 +5,7 @@ the inverse of the dual operator of the bonded cell, prescribed jumps g in rows 
 
     lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
 
-where L is the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
+with L the bonded stiffness times the area |UC|: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
 `coulomb_faces` uses the S of the plane problem; in generalized plane strain `AxialFaces` appends rows and columns.
 """
 
