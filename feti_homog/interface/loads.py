@@ -158,7 +158,7 @@ class LoadScales:
         return largest
 
     def imposed(self, loads: Float) -> float:
-        """Return the largest displacement E y that loads (v,) impose on the cell."""
+        """Return the largest displacement that the strains of loads (v,) impose on the cell."""
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
