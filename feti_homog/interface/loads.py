@@ -107,7 +107,7 @@ class LoadScales:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
         least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
         largest_stiffness: largest entry of Reuss' bound.
-        bound_ratio: least ratio of Reuss' to Voigt's bound for strains; a stress causes at least this share of `asked`.
+        bound_ratio: least ratio of Reuss' to Voigt's bound for strains, and of a strain in `acting` to `asked`.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
         longest: (k,) largest tributary length on the interface of each node.
