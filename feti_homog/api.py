@@ -84,6 +84,7 @@ def run_sweep(
     Raises:
         CaseError: the cases are faulty, `out` cannot be used, or `ranks_per_case` does not divide the ranks.
         ConvergenceError: cases failed; `collect_sweep` makes the table of the finished cases.
+        FetiHomogError, LibraryError, TypeError: as in `run`.
     """
     with _started(comm) as comm:
         from feti_homog.studies import case_runs, collect, sweep_cases
@@ -116,7 +117,7 @@ def run_fit(
 ) -> dict[str, Any]:
     """Fit the unknowns in a file or document to measured values.  Collective.
 
-    Returns the content of fit.json on every rank.  Interruptions and arguments are as for `run_sweep`.
+    Returns the content of fit.json on every rank.  Interruptions, arguments and other errors are as for `run_sweep`.
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.

@@ -72,8 +72,8 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
 def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
     """Return closed-form estimates and bounds for a cell without debonded faces.
 
-    Estimates exist for round fibres without coatings, held in the matrix by the same bonds; springs need fibres of
-    one radius.  Bounds exist for rigid bonds between transversely isotropic phases.
+    Estimates exist for round fibres without coatings, held in the matrix by the same bonds; springs need one
+    radius in each phase.  Bounds exist for rigid bonds between transversely isotropic phases.
     """
     from feti_homog.materials import estimates  # unused for bonded cells in the plane
 

@@ -161,7 +161,7 @@ class AnalysisContext:
     def unit_responses(
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[averaging.Response]]:
-        """Return `CellLoads.secants` and the responses to `sign` times the unit loads.  Collective."""
+        """Return `CellLoads.secants` and the responses to `sign` times the unit loads, from `starts`.  Collective."""
         responses = list[averaging.Response]()
         for problem in self.loads.problems:
             first, count = len(responses), len(problem.loads)

@@ -78,7 +78,7 @@ def rays_of(
     """Return the rays at angles (n,), in degrees, from the first axis.
 
     `plane` names both axes.  With the stiffness C, stress rays have the strains E = C^-1 S for the stresses S, and
-    begin at zero stress after the temperature change (no `thermal_stress`: no change); strain rays at zero strain.
+    begin at zero stress after the temperature change, if there is a `thermal_stress`; strain rays begin at zero strain.
     """
     strains, stresses = voigt.voigt_names(len(stiffness))
     by_stress = plane[0] in stresses

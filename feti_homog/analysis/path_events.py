@@ -29,7 +29,7 @@ UNKNOWN = ("alpha", "broken", "certificate", "bond")  # arrays with NaN for miss
 class Work:
     """The energies per cell area up to a path point.
 
-    The loss in breaks is the work of the loads minus the stored energy.
+    The loss in breaks is the work of the loads minus the stored energy and the frictional heat.
 
     Attributes:
         all_equilibria: energies along all equilibria, where each bond breaks at its break load, with snap-back.
@@ -295,5 +295,5 @@ def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
 
 
 def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
-    """Rebuild a bond state from the arrays that `_bond_arrays` made."""
+    """Rebuild a bond state from the arrays that `_bond_arrays` made; absent arrays become None."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]

@@ -94,7 +94,7 @@ class StateRecorder:
 
     Attributes:
         has_place: whether fields are recorded.
-        is_recording: whether states of a path are recorded, for fields or for the utilisation of strengths.
+        is_recording: whether states are recorded, for fields or for the utilisation of strengths.
         singularities: descriptions of points near which the largest stresses have no limit.
         error: the write error, if any, after which the run continues without the file.
     """

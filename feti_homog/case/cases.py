@@ -114,7 +114,7 @@ class Case:
 
     @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
-        """Return the loads of the case with all components; () if the section gives no loads.
+        """Return the loads of [path] or [load] with all components; () for other sections.
 
         A load maps names to values: the strain or stress of each component in Voigt order and, in generalized plane
         strain, the temperature.  The unloaded start of a path is left out.

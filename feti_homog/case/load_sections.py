@@ -88,7 +88,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
 
 
 def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
-    """Return the first load that names each component, by stress: an index, or len(loads) without such a load."""
+    """Return the index of the first load that names each component, by stress name; len(loads) without such a load."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
         for names in voigt.PLANE_STATES[plane].components
@@ -118,7 +118,7 @@ class AnalysisSection:
 
     @property
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
-        """Return the given loads by their keys in the section; empty for unit loads."""
+        """Return the loads of [path] or [load] by their keys in the section; empty for other sections."""
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
@@ -156,7 +156,7 @@ class Angle(AnalysisSection):
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves, with either contact: per opening one under `strain`, else one per unit load."""
+        """Return the number of solves: one per opening under `strain`, else one per opening and unit load."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 

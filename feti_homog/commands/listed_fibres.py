@@ -21,7 +21,7 @@ def table(source: Path) -> str:
 
     The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
     coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell, unless
-    fibres are neither discs nor ellipses: these fibres have no radius, and no centre if they wind around the cell.
+    a mesh has other shapes than discs and ellipses: their rows have no radius, nor a centre if they wind around.
 
     Raises:
         CaseError, MeshError: the source is faulty, or does not list its voids.

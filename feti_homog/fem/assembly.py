@@ -81,7 +81,7 @@ def assemble(
 
 @lru_cache(maxsize=16)  # pieces of a label image have few different classes
 def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
-    """Find the sums of couples (t p) that are blocks of K, their columns, and the first of each row."""
+    """Find the couples (t p) that each block of K sums, the block columns, and the first block of each row."""
     of_triangle, macro = np.frombuffer(classes, np.int32).reshape(-1, len(lattice.nodes)), MacroElement.of(lattice)
     rows, columns = of_triangle[:, macro.rows], of_triangle[:, macro.columns]
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()

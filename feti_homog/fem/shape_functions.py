@@ -33,7 +33,7 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 def quadrature(functions: int) -> tuple[Float, Float]:
     """Return the reference gradients (q, a, 2) of the shape functions, and the quadrature weights (q,).
 
-    The functions are 3 linear, 6 quadratic, or 7: the quadratic functions and the bubble 27 r_0 r_1 r_2.
+    The functions are 3 linear, 6 quadratic, or 7: the quadratic functions and the bubble 27 r_0 r_1 r_2, barycentric r.
     """
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])

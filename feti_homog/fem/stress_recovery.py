@@ -50,7 +50,7 @@ class RecoveredStress:
         loads: (v, k) macroscopic strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure.
         known: tractions that the recovered stresses in linear elements obey.
-        shared: vertex classes (s,), and fits (s, p, m k) that include the elements of other pieces of the body.
+        shared: vertex classes (s,), and p coefficients (s, p, m k) of fits that include other pieces of the body.
     """
 
     points: Float

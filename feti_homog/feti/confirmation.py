@@ -73,7 +73,7 @@ class InfluenceSolutions:
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Compare solutions by F lambda with the prediction, and renew the quota.  Collective.
+        """Compare solutions by F lambda with the prediction, and renew the quota; `d` as in `solutions`.  Collective.
 
         The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
         on active rows.  If an error exceeds MOST_FOLLOWED_ERROR and twice the rounding, the answer is computed anew.

@@ -51,7 +51,7 @@ class FetiSolver:
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         natural: rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
-        coarse_dimension: number of coarse displacements; without `adaptive`, of rigid-body motions.
+        coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
         solves: loads solved so far.
         condition: largest estimated condition number of the preconditioned operator so far; 0 without iterations.
@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute |UC| Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
+        """Compute area Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:
             local = local + self._pushes.T @ alpha[self.natural.owned_modes]

@@ -198,7 +198,7 @@ class SolverParts:
 
     @property
     def coarse_dimension(self) -> int:
-        """Return the number of coarse displacements; without `adaptive`, of rigid-body motions."""
+        """Return the number of coarse displacements, or of rigid-body motions without `adaptive`."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:

@@ -30,7 +30,7 @@ class Response:
         stress: (v,) Sigma = <sigma>, conjugate to E.
         scale: ratio of the response to `state`.
         stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
-        in_springs: spring energy per cell area; without friction 1/2 sum lam^2 C / |UC|.
+        in_springs: spring energy per cell area; without friction 1/2 sum lam^2 C / area.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
         checks: relative error in each law.

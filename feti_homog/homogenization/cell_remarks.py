@@ -107,7 +107,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks: on sides without images, or else on order, scatter, `bonds` with teeth (0: unknown), fibres."""
+    """List remarks on sides that are not periodic, or else on order, seed, teeth of `bonds` (0: unknown), fibres."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"

@@ -130,7 +130,7 @@ def fits_across_cuts(
     """Fit recovered stresses at vertices on or next to cuts, over all pieces.  Collective.
 
     Returns:
-        For each mesh index, the vertex classes (n,) and their fits (n, p, m k), as in `RecoveredStress.shared`.
+        For each mesh index, the vertex classes (n,) and their fits: p coefficients (n, p, m k) of m stresses, k loads.
     """
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
@@ -214,7 +214,7 @@ def _code(a: Int, b: Int, size: int) -> Int:
 def _over_pieces(
     shared: SharedVertices, strips: Sequence[_Strip], pairs: Sequence[tuple[Float, Float]]
 ) -> list[tuple[Float, Float]]:
-    """Sum the moments and sums in `pairs` (vertices, p, ..) over pieces at shared vertices, in place.  Collective."""
+    """Sum arrays (vertices, p, ..) in `pairs` over pieces at shared vertices, in place; return `pairs`.  Collective."""
     parts = [np.concatenate([a[s.shared], b[s.shared]], axis=2) for s, (a, b) in zip(strips, pairs, strict=True)]
     totals = shared.sum([part.reshape(len(part), -1) for part in parts])
     for strip, (moments, sums), part, total in zip(strips, pairs, parts, totals, strict=True):

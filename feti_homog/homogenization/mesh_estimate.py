@@ -42,11 +42,11 @@ class EnergyErrors:
     """The errors (k, k) in the energies E_i . Sigma_j of k responses.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j, with ds the recovered stresses less the element stresses, plus the
+        elements: int ds_i : S : ds_j / area, with ds the recovered stresses less the element stresses, plus the
             spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
         shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
-        least_of_two: least ratio of an error i != j to sqrt(a_i a_j), a = |elements_ii| + |arcs_ii|.
+        least_of_two: least estimate of an error i != j over sqrt(a_i a_j), with a_i = |elements_ii| + |arcs_ii|.
     """
 
     elements: Float

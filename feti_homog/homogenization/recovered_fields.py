@@ -130,7 +130,7 @@ def _stresses(
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
     """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; write u* to `out` (dofs, s).
 
-    The second of the two stress arrays has 0 in place of rounding errors.  States with a response None have 0.
+    The second stress array has 0 in place of rounding errors.  States with a response None have 0.  Collective.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))

@@ -1,6 +1,6 @@
 """Differentiate stiffness and conductivity with respect to constants of the case, without further solves.
 
-Let e_i be the strains under the unit load i, followed by the other uniform loads.  The stiffness of a linear cell is
+Let e_i be the strains and the other uniform loads under the unit load i.  A linear cell of area |UC| has stiffness C,
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 

@@ -55,7 +55,7 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """The first degree of freedom of each part in this rank's vectors, and their length."""
+        """The first degree of freedom of each part in this rank's vectors, and their length: (parts + 1,)."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
@@ -162,7 +162,7 @@ class TornCell:
         return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
-        """Return the mask (k,) of this rank's initially debonded nodes; arcs without an angle take `opening`."""
+        """Return the mask (k,) of this rank's initially debonded nodes; arcs without angle take `opening` degrees."""
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)

@@ -107,7 +107,7 @@ class LoadScales:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
         least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
         largest_stiffness: largest entry of Reuss' bound.
-        bound_ratio: least ratio of Reuss' to Voigt's bound for strains; a stress causes at least this share of `asked`.
+        bound_ratio: least ratio of Reuss' to Voigt's bound for strains, and of a strain in `acting` to `asked`.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
         longest: (k,) largest tributary length on the interface of each node.
@@ -158,7 +158,7 @@ class LoadScales:
         return largest
 
     def imposed(self, loads: Float) -> float:
-        """Return the largest displacement E y that loads (v,) impose on the cell."""
+        """Return the largest displacement that the strains of loads (v,) impose on the cell."""
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
         return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
@@ -208,7 +208,7 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the largest strain of a state (v,), relative to the largest strain of `asked` (v,), or 0."""
+        """Return the ratio of the largest strain of a state (v,) to the largest of `asked` (v,); 0 if `asked` is 0."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:

@@ -112,7 +112,7 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
 
 def _along_axes(S: Array) -> dict[str, Any]:
-    """Tabulate the moduli and ratios of a compliance along the axes of the cell."""
+    """Tabulate the moduli and ratios of a compliance, (3, 3) or (6, 6), along the axes of the cell."""
     normal, pairs = (2, ((0, 1), (1, 0))) if len(S) == 3 else (3, ((0, 1), (0, 2), (1, 2)))
     table = {f"E{i + 1}": 1 / S[i, i] for i in range(normal)}
     table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
@@ -158,7 +158,7 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return the bulk and shear moduli k and mu of the nearest isotropic plane stiffness.
+    """Return the bulk and shear moduli k and mu of the isotropic stiffness nearest to a plane stiffness (3, 3).
 
     k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8, nearest in the Frobenius norm.  Both moduli
     are equal in all axes.
@@ -176,7 +176,7 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return the distance ||C - C_iso|| / ||C|| to the nearest isotropic plane stiffness, equal in all axes."""
+    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3) from the nearest isotropic stiffness, equal in all axes."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
@@ -228,7 +228,7 @@ def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """Return the ranges of the moduli E and G over DIRECTIONS directions n across x3.
+    """Return the ranges of the moduli E and G of a stiffness (6, 6) over DIRECTIONS directions n across x3.
 
     1/E = sigma:S:sigma with the compliance S and sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to
     n and x3.  Raises numpy.linalg.LinAlgError if the stiffness is singular.

@@ -1,7 +1,7 @@
 """Define the forms in which a section [material.PHASE] gives the constants and the strength of an elastic phase.
 
 The utilisation of a strength is 1 at failure, and proportional to the stress.  Criteria: maximum principal stress
-sigma_1 / X; von Mises; Drucker and Prager, fitted to both uniaxial strengths; for fibres along x3 the largest of
+sigma_1; von Mises; Drucker and Prager, fitted to both uniaxial strengths; for fibres along x3 the largest of
 Hashin's four modes (J. Appl. Mech. 47 (1980) 329).
 """
 

@@ -92,7 +92,7 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the ends (k, 2) of torus edges in the mask `chosen`; on cell sides, of the left or lower copy."""
+        """Return the ends (k, 2) of torus edges in the mask `chosen`, on cell sides at the left or lower copy."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 

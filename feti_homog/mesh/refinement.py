@@ -210,7 +210,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Return the class of a node on a torus `edge`: number `position`, 1 to M - 1, after `n_classes` vertices."""
+    """Return the class (k,) of node `position` (k,), 1 to M - 1, on a torus `edge` (k,), after `n_classes` vertices."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 

@@ -1,4 +1,4 @@
-"""Describe fibres in a cross-section: outlines, tables, arrangements on the torus, and statistics.
+"""Describe fibres in a cross-section: outlines, tables, images, and arrangements on the torus.
 
 Imports `microstructure.shapes`, `schema` and `system`.  Main entries: `arrangements.Arrangement`,
 `periodic_table.table_arrangement`, `random_fibres`.

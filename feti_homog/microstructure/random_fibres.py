@@ -179,8 +179,8 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum; success is a clearance of at
-    least 1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2; success is at least
+    1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
     reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
@@ -222,6 +222,6 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, between a periodic pattern and a measured window."""
+    """Return the `match_distance`, in mean diameters, of N discs in a periodic cell from a measured window."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

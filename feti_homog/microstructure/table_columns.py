@@ -78,7 +78,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def row_fault(line: str, cells: Sequence[str], count: int) -> str:
-    """Return the fault of a row: an open quotation mark, or no `count` cells; else an empty string."""
+    """Return the fault of a row: an open quotation mark, or a cell count other than `count`; else an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
     return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"

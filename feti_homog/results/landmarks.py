@@ -27,7 +27,7 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Successive turning points, and so the ends of the curve, differ by more than `threshold`; a flatter curve has none.
+    Successive turning points, which may be ends of the curve, differ by more than `threshold`; flat curves have none.
     """
     entries, low, high, rises, falls = list[int](), 0, 0, True, True
     for number, value in enumerate(values):

@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about the other, or unreadable, result that a run of `case` replaces, or "".  Call on one rank.
+    """Return a line about an unreadable or another case's result that a run replaces, or "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.

@@ -89,7 +89,7 @@ def legs_of(document: Document) -> Float:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of (n, c) with an entry above `share` times the largest.  Magnitudes are compared."""
+    """Return the columns of `values` (n, c) with an entry above `share` times the largest.  Magnitudes are compared."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
@@ -113,7 +113,7 @@ def legs(document: Document) -> int:
 
 
 def first_leg(document: Document) -> int:
-    """Return the number of points on the first leg; for increments, of all points."""
+    """Return the number of points on the first leg, or of all points for increments."""
     points = document["path"]
     if document["case"]["path"]["method"] == "increments":
         return len(points)

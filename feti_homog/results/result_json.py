@@ -120,8 +120,8 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
     """Write a CSV table with a row for each record, and return the path.  Call on one rank.
 
-    The records have one class.  Columns are numbers, and array components, without empty columns, other arrays and
-    nested records.  Raises FetiHomogError if the table cannot be written.
+    The records have one class.  Columns are numbers, strings and array components, without empty columns, other arrays
+    and nested records.  Raises FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []
@@ -139,7 +139,7 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:
-    """Return the record fields that fill columns.  These are numbers, and arrays with named components."""
+    """Return the record fields that fill columns.  These are numbers, strings, and arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}

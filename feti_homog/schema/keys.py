@@ -102,8 +102,8 @@ def key(
 ) -> Any:
     """Return a dataclass field that holds the rules of the key with the field name.
 
-    Without `default` and `absent`, the key is required.  A required key with conditions, or a missing key with the
-    meaning `absent`, has the value None.  `default_words` replace the default in the reference.  `attributes` are
+    Without `default` and `absent`, the key is required.  A missing key has the value None if it is required under
+    conditions, or has a meaning `absent`.  `default_words` replace the default in the reference.  `attributes` are
     further attributes of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)

@@ -263,7 +263,7 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 
 def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
-    """Return warnings and remarks, one for all that agree up to a colon, with first case and number of cases."""
+    """Return warnings and remarks; lines that agree up to a colon become one, with the number of their cases."""
     cases: dict[tuple[str, str], list[str]] = {}
     for kind in ("warning", "remark"):
         for entry, state in zip(entries, states, strict=True):

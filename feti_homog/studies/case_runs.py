@@ -48,7 +48,7 @@ def run_all(
 
     A group of `ranks_per_case` ranks, by default all, runs one case; the groups work concurrently.  With `retry`,
     failed cases run again.  With `quiet` True only failures are printed; with None the first group also shows the
-    progress; with False it also prints a line for each case, and rank 0 a summary.
+    progress; with False the groups also print a line for each case, and rank 0 a summary.
 
     Raises:
         CaseError: PETSc options or materials are faulty, `ranks_per_case` does not divide the rank count, or the folder

@@ -38,7 +38,7 @@ NAMES = {
 
 
 def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw moduli over varying fibre fractions.  Returns [path of moduli.png], or [] without.  On one rank."""
+    """Draw moduli over varying fibre fractions.  Returns [path of moduli.png]; [] if none vary.  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
     with mpl.rc_context(plot_helpers.STYLE):

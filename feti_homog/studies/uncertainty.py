@@ -180,7 +180,7 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return a placeholder datum for each number in all results.  Paths have load factors and peak components only."""
+    """Return a placeholder datum for each number that all results have; of paths, load factors and peak components."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone

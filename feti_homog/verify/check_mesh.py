@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Mark nodes (k,) inside an arc, and outside all, none at tips; arcs open by `opening` degrees by default."""
+    """Mark nodes (k,) inside arcs and outside all arcs, but none at tips; `opening` is the default angle in degrees."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]

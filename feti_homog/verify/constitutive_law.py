@@ -19,9 +19,9 @@ Constants = Mapping[str, Any]
 def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """Compute stiffnesses (phases, v, v) and expansions (phases, v) in the axes of the cell.
 
-    In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  Expansions are the strains R_ip
-    R_jq alpha_pq per temperature, R rotating material axes, in generalized plane strain if all phases have alpha; else
-    0.  In conduction the temperature is a displacement along x3.  Raises CaseError for a phase without material.
+    In plane strain E33, gamma13 and gamma23 are 0, in plane stress S33, S13 and S23.  In generalized plane strain,
+    expansions are R_ip R_jq alpha_pq per temperature, with the rotation R of the material axes, if all phases have
+    alpha; else 0.  In conduction the temperature is a displacement along x3.  Raises CaseError without a material.
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
@@ -70,7 +70,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return 6 machine precisions times the largest volumetric / least compliance, and times the stiffness contrast."""
+    """Return 6 machine eps times the largest ratio of volumetric to least compliance, and times the contrast."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)

@@ -69,7 +69,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,) of openings in a constant ratio, in the mode of the larger end / delta_0."""
+        """Compute damage levels (n + 1,) at openings in a constant ratio, in the mode with the larger end / delta_0."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))

@@ -132,7 +132,7 @@ class FaceEigenproblems:
 def eigenproblem(
     block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """Set up the eigenproblem of a subdomain, or of its faces if `block.facewise`.
+    """Set up the eigenproblem of a subdomain, or of its faces if `block.facewise`; see the two classes.
 
     Raises:
         MeshError: a face neighbourhood is not a valid subdomain.

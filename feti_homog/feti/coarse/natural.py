@@ -95,7 +95,7 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return the matrix G^T A G, which stores 36 products a row between two bodies.  Collective when first read.
+        """Return the matrix G^T A G; a row between two bodies stores 36 products.  Collective when first read.
 
         Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
         """

@@ -143,6 +143,6 @@ class InterfaceNeighbours:
 
 
 def _once(values: Int) -> Int:
-    """Return the values that occur exactly once."""
+    """Return the values (k,) that occur exactly once in `values` (n,), in ascending order."""
     different, count = np.unique(values, return_counts=True)
     return np.asarray(different[count == 1])

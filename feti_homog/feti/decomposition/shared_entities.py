@@ -124,7 +124,7 @@ def _check(meshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Floa
 def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
     """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
-    Edges with keys `edge` (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), entities or pinned.
+    Edges with keys `edge` (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), except to pinned classes.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]

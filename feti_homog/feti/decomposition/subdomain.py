@@ -255,7 +255,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute orthonormal translations and, if it `rotates`, the turn (cn, k) of a body that leave `held` at rest."""
+    """Compute an orthonormal kernel (cn, k): translations, and a turn if the body `rotates`; `held` nodes rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:

@@ -109,7 +109,7 @@ class ExactInverse(Preconditioner):
         self._is_fresh = True
 
     def _factor(self, active: Float) -> None:
-        """Factor the reference cell with the bonds `active`, which must hold all bodies.  Collective."""
+        """Factor the reference cell with the bonds `active` (owned rows,), which must hold all bodies.  Collective."""
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
             process.trim_memory()
@@ -161,7 +161,7 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at `rows`, and drop none at `needed`; False if asymmetry exceeds `max_error`.  Collective."""
+        """Follow columns at global `rows`; `needed` ones stay.  False if asymmetry exceeds `max_error`.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -172,7 +172,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Select the `rows` without columns, and active rows without columns near them.  Collective.
+        """Select global `rows` (k,) without columns, and active rows without columns near them.  Collective.
 
         Neighbours of broken bonds break next, and columns are cheaper together.  If no row is active, none is added.
         """
@@ -214,7 +214,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Returns None unless as many pins exist, after `_restart` if the reference cell is old.
+        possible positions.  Returns None unless `free` pins exist; the cell is then factored anew if it has changed.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:

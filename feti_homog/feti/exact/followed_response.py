@@ -58,7 +58,7 @@ class FollowedResponse:
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
-        """Return the global `rows` that have no column."""
+        """Return the global `rows` (k,) that have no column."""
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
@@ -225,7 +225,7 @@ class FollowedResponse:
         return columns, distributed_arrays.gather_rows(self._comm, values, self._first, everywhere)
 
     def _change(self, difference: Float, B: Float, values: Float) -> None:
-        """Subtract `difference` B U_I from U, and keep `difference` B Gamma_I: waiting; `values` as from `_present`."""
+        """Subtract `difference` B U_I from U, and let `difference` B Gamma_I wait; `values` are from `_present`."""
         n, k = self._count, len(B)
         self.answer = self.answer - difference @ (B @ values[:k, k:])
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B

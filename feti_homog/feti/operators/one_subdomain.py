@@ -103,7 +103,7 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """Extend displacements x (n, k), under loads (v, k) unless None, to (all dofs, k) by the kept factor."""
+        """Extend displacements x (n, k) to (all dofs, k) by the kept factor; `loads` (v, k) are None without loads."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:

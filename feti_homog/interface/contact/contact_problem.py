@@ -38,14 +38,14 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """The contact problem of all interfaces, k nodes on this rank; solves and `undetermined` set the state of `solver`.
+    """The contact problem of all interfaces, with k nodes on this rank.  Methods that solve set the state of `solver`.
 
     Attributes:
         solver: dual solver.
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
         softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
-        block_pivots: number of block pivots, from the last one with progress, before single nodes change; 0: at once.
+        block_pivots: number of block pivots before single nodes change, counted from the last pivot with progress.
     """
 
     solver: FetiSolver

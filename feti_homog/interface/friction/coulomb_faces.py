@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses and x: from all sliding faces stuck, from one face stuck, then by trial."""
+        """Yield other admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -262,6 +262,6 @@ class CoulombFaces(FaceSystem):
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of an implicit step: final friction forces times slips."""
+        """Return the heat of an implicit step: final friction forces times slips, at sliding nodes."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

@@ -111,7 +111,7 @@ class FaceSystem:
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
-        """Return `FollowedStatuses` with given rows; None at a tiny pivot, or while factoring is cheaper."""
+        """Return `FollowedStatuses` with rows from `free_rows`; None at a tiny pivot, or while factoring is cheaper."""
         if self._followed is None:
             if self._factored < FACTORIZATIONS:
                 return None
@@ -119,7 +119,7 @@ class FaceSystem:
         return self._followed if self._followed.turn(free, slope) else None
 
     def _system(self, free: Bool, slope: Float) -> status_system.StatusSystem:
-        """Return the factored system of given rows; reuse the last system if it has these rows."""
+        """Return the factored system of rows from `free_rows`; reuse the last system if it has these rows."""
         key = free.tobytes() + slope.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, status_system.StatusSystem(self.S, free, slope)

@@ -5,7 +5,7 @@ the inverse of the dual operator of the bonded cell, prescribed jumps g in rows 
 
     lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
 
-where L is the bonded stiffness times the area: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
+with L the bonded stiffness times the area |UC|: the cell stores x.S x / 2 with x = (g, E), S = [[H_DD, -b], [-b^T, L]].
 `coulomb_faces` uses the S of the plane problem; in generalized plane strain `AxialFaces` appends rows and columns.
 """
 
@@ -227,7 +227,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return bond tractions without friction on damage, (k, 2), or (k, 3) with the axial one; 0 if debonded."""
+        """Return the tractions in the intact fraction of bonds, (k, 2), or (k, 3) with the axial one; 0 if debonded."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])

@@ -176,7 +176,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """A law for bonds that break at a certain energy of the undamaged springs, by mode.
+    """A law in which bonds break at an energy of the undamaged springs that depends on the mode.
 
     A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 

@@ -1,4 +1,4 @@
-"""Energy criteria for the bonds of an elastic interface (LEBIM).
+"""Energy criteria for the bonds of an elastic interface (linear elastic-brittle interface model, LEBIM).
 
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 

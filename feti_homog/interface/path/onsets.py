@@ -50,7 +50,7 @@ class Onset:
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
         """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf if none does.
 
-        Tractions are `before` (k, c), or 0, + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations
+        Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations
         under `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
         """
         n, k, c = direction.shape

@@ -25,8 +25,8 @@ class PathState:
         bonds, lam: initial bond states and multipliers.
         origin: state at the beginning of the leg.
         last: state at the last point.
-        broken: fracture energy per cell area of the bonds that broke at the last point, with a toughness for the mode
-            of each break; 0 without toughness, None without a break.
+        broken: fracture energy per cell area of the bonds that broke at the last point, each in its mode;
+            0 without toughness, None without a break.
         stretched: with friction, energy per area in the springs of damaged bonds, before the break at the last point.
     """
 

@@ -34,8 +34,8 @@ def begin(
 
     Args:
         listed: the arrangement of a table; None for other cells, which may be large.
-        marks: directions of debond tips, where the mesh gets nodes. A mark within MERGED of another mark, or of a
-            crossing of the circle with the cell boundary, moves onto it.
+        marks: directions of debond tips, where the mesh gets nodes. A mark moves onto another mark, or onto a
+            crossing of the circle with the cell boundary, within `outline.MERGED` radians.
         policy: rules for the division into tiles.
 
     Raises:

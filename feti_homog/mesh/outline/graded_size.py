@@ -71,7 +71,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return the vertices as sources, with the distance to the next vertex on the torus as length."""
+    """Return vertices (v, 2) as sources, with the distance to the next vertex on the torus as length."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -97,7 +97,7 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes in a case, relative to the cell width; `tip` is `interface` unless the cell `has_tips`."""
+        """Return the sizes in a case / cell width; `tip` is `interface` without tips or without `tip_size`."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
@@ -135,7 +135,7 @@ class SizeField:
         nearest: int = NEAREST,
         chunk: int = CHUNK,
     ) -> None:
-        """Prepare sources on the torus with periods `size` (2,): `nearest` count at a position, a query has `chunk`."""
+        """Prepare sources on a torus with periods `size` (2,); `nearest` of them count at each of `chunk` points."""
         self.largest, self.graded = largest, graded
         self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))

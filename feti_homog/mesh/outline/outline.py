@@ -84,7 +84,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the coordinates of corners and curves on the side through 0 along `axis`, in ascending order."""
+    """Return the coordinates (k,) of corners and curves on the side through 0 along `axis`, in ascending order."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])

@@ -168,7 +168,7 @@ class MatrixTiles:
 
 
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
-    """Return the matrix label (k,) beside discs (k,) at angles (k,).
+    """Return the matrix label (k,) beside discs (k,) at angles (k,), in radians.
 
     It is the `label` (h,) of the next half-line clockwise, or `alone` (n,), if not -1, of a disc without half-lines.
     """

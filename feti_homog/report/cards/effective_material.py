@@ -207,7 +207,7 @@ def comment_lines(paragraphs: Iterable[str], mark: str) -> list[str]:
 
 
 def number(value: float) -> str:
-    """Write a value with nine significant digits, far below the mesh error, in at most 16 characters."""
+    """Write a value with nine significant digits, more than the mesh justifies, in at most 16 characters."""
     return f"{float(value) + 0.0:.9g}"  # no -0.0
 
 

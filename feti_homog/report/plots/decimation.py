@@ -151,7 +151,7 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
-    """Return the largest displacement factor s at which no drawn triangle turns over.
+    """Return the largest factor s of displacements u (p, 2) at which no drawn triangle turns over.
 
     For all s' up to s, det(I + s' grad u) = 1 + s' tr(grad u) + s'^2 det(grad u) >= LEAST_AREA in every drawn triangle.
     The result is infinite if every factor is possible.

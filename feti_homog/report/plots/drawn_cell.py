@@ -60,8 +60,7 @@ class InterfaceEdges:
     def mark(self, axes: Axes, points: Array, state: Any, magnified: float = 1.0) -> list[Line2D]:
         """Draw the interface edges in a state, with nodes at `points` (p, 2) and `magnified` widths.
 
-        Returns legend lines for the drawn states.  The colour of damaged edges shows the damage at their ends in
-        tenths.
+        Returns legend lines of drawn states.  Colours of damaged edges show the larger damage of their ends in tenths.
         """
         states = self.state(states_of_nodes(state))
         damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0) if "damage" in state else np.zeros(len(states))

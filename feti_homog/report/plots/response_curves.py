@@ -139,7 +139,7 @@ def _limit(axes: Axes, places: Array) -> list[str]:
 
 
 def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
-    """Draw elasticities d ln c / d ln p of constants c (columns) by parameters p (rows).  Returns None without any."""
+    """Draw elasticities d ln c / d ln p of constants c (columns) by parameters p (rows).  Returns None without rows."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None

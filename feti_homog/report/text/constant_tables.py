@@ -132,7 +132,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Return a table of constants between bounds, or only a title without bounds; marks Reuss-Voigt violations."""
+    """Return a table of constants between bounds, with Reuss-Voigt violations marked; without bounds, only a title."""
     if not document.get("bounds"):
         return Table("Bounds: none for cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -185,7 +185,7 @@ def cell_constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the composites to which the estimates apply, after the property of this cell that excludes it."""
+    """Name the kind of composites with estimates: without the property that excludes this cell."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"

@@ -17,8 +17,8 @@ ROWS = 15  # rows of the table, unless the caller limits them
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path, with totals above rows of points.
 
-    At most `limit` rows, by default `ROWS`, have the first five of these columns; a line names the others, which are in
-    path.csv: leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
+    There are at most `limit` rows, by default `ROWS`.  The first five of these columns appear, a line names the others:
+    leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))

@@ -65,7 +65,7 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
     """Return function(path), computed in a child process with at most `memory` further bytes.
 
-    The child ends with this process, after `seconds` of processor time (None: by file size), or after 30 x `seconds`.
+    The child ends with this process, after `seconds` of processor time (None: by file size), or 30 times as long.
 
     Raises:
         FetiHomogError: the function raises it.
