@@ -29,7 +29,6 @@ RANDOM = {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 
         (RANDOM | {"bodies": "plane"}, {"max_dofs": 150}),
         ({"geometry": "hexagonal", "interface_size": 0.02}, {}),
     ],
-    ids=str,
 )
 def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces):
     torn, L, responses = solve(make_case(decomposition=pieces, **cell), comm)

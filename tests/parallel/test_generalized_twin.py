@@ -58,7 +58,6 @@ def compare(comm, tolerance=TIGHT, **case):
         ({"geometry": "hexagonal", "bodies": "plane"}, {}),
         ({"geometry": "random", "fibres": 3, "min_gap": 0.15, "seed": 3}, {}),
     ],
-    ids=str,
 )
 def test_bonded_cell_has_the_stiffness_of_its_twin(comm, case, sections):
     C = compare(comm, **ORTHOTROPIC, sections=sections, **case).effective_stiffness

@@ -82,7 +82,9 @@ HOLES[2:5, 3:7], HOLES[8:11, 8:11], HOLES[6:9, 3:5], HOLES[2:4, 9:11] = 1, 1, -1
 
 
 @pytest.mark.parametrize(
-    ("boundary", "sections"), [("periodic", SPRUNG), ("displacement", {}), ("traction", SPRUNG)], ids=str
+    ("boundary", "sections"),
+    [("periodic", SPRUNG), ("displacement", {}), ("traction", SPRUNG)],
+    ids=["periodic", "displacement", "traction"],
 )
 def test_voids_are_holes_in_a_mesh_of_quadrilaterals(comm, shared_path, sections, boundary):
     result = with_voids(comm, shared_path, HOLES, boundary, **sections)
@@ -98,7 +100,9 @@ def test_voids_are_holes_in_a_mesh_of_quadrilaterals(comm, shared_path, sections
 
 
 @pytest.mark.parametrize(
-    ("boundary", "sections"), [("periodic", LEAKY), ("displacement", LEAKY), ("traction", {})], ids=str
+    ("boundary", "sections"),
+    [("periodic", LEAKY), ("displacement", LEAKY), ("traction", {})],
+    ids=["periodic", "displacement", "traction"],
 )
 def test_pixels_conduct_as_the_same_quadrilaterals(comm, shared_path, sections, boundary):
     """With voids, which insulate."""
