@@ -1,7 +1,6 @@
 """Run random cases on all ranks of a job and check the relations that each draws.
 
-First each rank takes cases for itself, as it comes to them; then all ranks, if there are more, solve every case
-together.
+First each rank takes cases for itself, as it comes to them; then all ranks, if there are more, solve cases together.
 """
 
 import json
@@ -23,9 +22,11 @@ from feti_homog import run
 from feti_homog.errors import CaseError, FetiHomogError, MeshError, NotCarriedError
 from feti_homog.system.parallel.mpi_errors import end_job, on_root
 
-# Relations that a case draws, and the share of cases that try one of these on all ranks.
+# Relations that a case draws, and the share of cases that try one of these on all ranks.  Of the other cases all ranks
+# solve every EVERY_TOGETHER-th.
 DRAWN_PER_CASE = 2
 SHARE_ON_ALL_RANKS = 0.25
+EVERY_TOGETHER = 2
 # Of a path that ends since nothing carries the stresses any more, or faces with friction cannot go on.
 NOT_CARRIED = "prescribe strains there", "friction: "
 HELD, REFUSED, FAILED = "held", "refused", "FAILED"
@@ -65,6 +66,8 @@ def examine(
     rows = [row for of_rank in comm.allgather(own) for row in of_rank]
     ran = sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD)
     for number in ran if comm.size > 1 else []:
+        if len(numbers) > 1 and number % EVERY_TOGETHER and not _tries_more(stream(seed, number, ON_ALL_RANKS)):
+            continue
         try:
             found = _together(comm, seed, number, folder / f"case-{number}")
             if comm.rank == 0:
@@ -109,13 +112,18 @@ def chosen(rng: np.random.Generator, drawn: Drawn, base: Any, count: int) -> lis
     return [having[k] for k in sorted(rng.choice(len(having), count, replace=False, p=weights / weights.sum()))]
 
 
+def _tries_more(rng: np.random.Generator) -> bool:
+    """Return True if a case tries another relation on all ranks, by the first number of this stream."""
+    return rng.random() < SHARE_ON_ALL_RANKS
+
+
 def _together(comm: Any, seed: int, number: int, folder: Path) -> list[Row]:
     """Return the rows of a case on all ranks. Collective."""
     drawn, base = Drawn(seed, number, on_root(comm, lambda: draw(seed, number, folder).document), folder), None
     base = on_root(comm, document_of, folder / "out")
     rows = [_checked(comm, RANKS, drawn, base, folder)]
     rng = stream(seed, number, ON_ALL_RANKS)
-    if rng.random() < SHARE_ON_ALL_RANKS:
+    if _tries_more(rng):
         rows += [_checked(comm, relation, drawn, base, folder) for relation in chosen(rng, drawn, base, 1)]
     return rows
 

@@ -15,8 +15,8 @@ from hostile import case_files, events, fibre_tables, fuzzer, images, meshes, pr
 from hostile.attempts import Outcome
 from hostile.running import in_one_job, in_processes, make
 
-# Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
-EVERY = {1: 1, 2: 5, 3: 11}
+# Which of the attempts are tried on so many ranks: every one, every fifth.
+EVERY = {1: 1, 2: 5}
 OF_ONE_RANK = (events.FALSE_KIND, case_files.LONG_KIND)  # which another number of ranks refuses, or which rank 0 reads
 CASES, SEED = 100, 1
 MOST_IN_A_JOB = 300  # attempts, which end in time on a busy machine, too
