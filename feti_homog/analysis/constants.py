@@ -102,8 +102,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     """Return a radius for each fibre phase, or None if closed forms do not apply.
 
-    Closed forms need round fibres without coatings, the same bonds for all phases and, with springs, one radius a
-    phase.
+    Closed forms need round fibres without coatings, the same bonds for all phases and, for springs, equal radii.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}

@@ -113,7 +113,7 @@ def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[
             tips = ", tips at the next nodes outside" if case.cell.has_own_mesh else ""
             yield f"arc        [{label}] debonded[{number}]: {angle} about {arc.centre:g} degrees{tips}, fibre {chosen}"
     if case.cell.mix is not None:
-        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii
+        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
         mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
         yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
     if case.cell.match is not None:

@@ -52,7 +52,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
                 cell = context.loads.interfaces
                 event = path_events.stored(point, bonds[-1], responses, work, cell, _without_lists(entry))
                 context.checkpoint.write(number, *event)
-                line = f"{number + 1} points kept in {context.directory}: --resume goes on, plot and report show them"
+                line = (
+                    f"{number + 1} points kept in {context.directory}: plot shows them; run --resume or a study goes on"
+                )
                 standard_streams.remarks[:] = [line] * (context.directory is not None)
             for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
                 faults = len(context.checks.faults)

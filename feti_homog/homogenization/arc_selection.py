@@ -42,8 +42,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
     at least LEAST_SIZE, at most `interface_size`.  With several openings it may be larger, so that tips add at most
-    TIP_TRIANGLES times the triangles of the mesh.  Along paths, and so in envelopes, tips move: only `tip_size` then
-    sets a size.
+    TIP_TRIANGLES times the triangles of the mesh.  In paths and envelopes tips move: only `tip_size` sets a size there.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:

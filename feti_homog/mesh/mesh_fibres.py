@@ -101,7 +101,7 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find the fibres (k,) with boundaries on concentric ellipses.
+    """Find the fibres (k,) within the largest of the concentric ellipses that bound them.
 
     Also returns a plane edge (k,) on the largest ellipse of each fibre, and the mask (k,) of round fibres.
     """
@@ -111,21 +111,23 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
     order = np.lexsort((edge, -area[edge], body))
-    edge = edge[order]
+    triangle, edge = triangle[order], edge[order]
     bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
     outer, period = ellipses[edge[first]], torus.mesh.period
     offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
     is_off_centre = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
     is_round = np.bincount(place, np.isnan(torus.edge_circles[edge, 2]), len(bodies)) == 0
     is_concentric = (np.bincount(place, is_off_centre, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
+    middles = torus.mesh.points[torus.edges[edge[first]]].mean(axis=1)
+    inward = middles - torus.mesh.points[torus.mesh.triangles[triangle[first]]].mean(axis=1)
+    is_concentric &= (inward * (middles - outer.centres)).sum(axis=1) > 0
     return bodies[is_concentric], edge[first][is_concentric], is_round[is_concentric]
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """Return the numbers (constituents,) of fibres and coatings, and the mask (constituents,) of fibres.
 
-    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of the fibres in it; without any, it is
-    a fibre itself.
+    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of its fibres, or counts as a fibre.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]

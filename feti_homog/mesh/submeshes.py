@@ -208,8 +208,7 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     """Find the class with the least `unfit` (classes,) that is nearest to a cell corner.
 
     Returns:
-        A list of one triple: `unfit` of the class, its distance from the nearest corner, and its key; [] without
-        classes.
+        [] without classes, or one triple: `unfit` of the class, its distance from the nearest corner, and its key.
     """
     mesh = torus.mesh
     offset = mesh.points - np.round(mesh.points / mesh.period) * mesh.period

@@ -195,6 +195,9 @@ def _check_names(
     for word in unread:
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
+    endings = (table_columns.UNIT.search(words[column.place].strip()) for column in read if column.name != "angle")
+    if len(units := {ending[2].lower() for ending in endings if ending and ending[2]}) > 1:
+        faults.add(row, f"columns in {' and '.join(sorted(units))}: expected one unit of length")
     ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
     # The radius, or the sizes of a shape that replace it.
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))

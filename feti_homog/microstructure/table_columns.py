@@ -85,7 +85,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
-UNIT = re.compile(rf"(\[[^][]*\]|\([^()]*\)|/[^/]+|[_\s]({UNITS})(\^?[2²])?)$", re.IGNORECASE)
+UNIT = re.compile(rf"([\[(/_\s]\s*({UNITS})(\^?[2²])?\s*[\])]?|\[[^][]*\]|\([^()]*\)|/[^/]+)$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
@@ -95,19 +95,15 @@ CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_ce
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
 
-def _half(value: float) -> float:
-    return value / 2
-
-
 # Other names of a column (earlier entries take precedence), the column, and the conversion of values. Major and Minor,
 # ImageJ's axes, make an area superfluous; MATLAB's Centroid_1 is x, centroid-0 of scikit-image is the row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
     (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1", "col", "column"), "x", float),
     (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0", "row"), "y", float),
-    (("major", MATLABS_AXIS), "a", _half),
-    (("minor", "minoraxislength"), "b", _half),
+    (("major", MATLABS_AXIS), "a", lambda d: d / 2),
+    (("minor", "minoraxislength"), "b", lambda d: d / 2),
     (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", float),
-    (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
+    (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", lambda d: d / 2),
     (("area",), "radius", lambda area: math.copysign(math.sqrt(abs(area) / math.pi), area)),
     (("material", "type"), "phase", float),
 )

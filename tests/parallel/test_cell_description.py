@@ -29,6 +29,10 @@ SQUARE = """geometry = "table"
 width = 1.0
 height = 1.0
 fibre_list = [{x = 0.5, y = 0.5, radius = 0.35, sides = 4, angle = 45.0}]"""
+MIX = """geometry = "random"
+mix = {fibre = 0.2, glass = 0.2}
+radii = {fibre = 1.0, glass = 2.0}
+width = 10.0"""
 BODIES = '[decomposition]\ncut = "bodies"\n'
 CASES = {
     "bonded": changed(("mesh_size = 0.05", "mesh_size = 0.2")),
@@ -37,6 +41,11 @@ CASES = {
     "path": changed(*PATH, end=STRENGTH),
     "coated, implicit": changed(*COATED, end=f'{COATING}[petsc]\nfeti_dual_operator = "implicit"\n'),
     "polygon": changed(('geometry = "hexagonal"\nfibre_fraction = 0.4', SQUARE), ("= 0.05", "= 0.2")),
+    "mix": changed(
+        ('geometry = "hexagonal"\nfibre_fraction = 0.4', MIX),
+        ("= 0.05", "= 0.2"),
+        end="[material.glass]\nyoung = 70.0\npoisson = 0.2\n",
+    ),
     "bonded, influence": changed(end='[petsc]\nfeti_pc_type = "influence"\n'),
     "in space": changed(('plane = "strain"', 'plane = "generalized"'), ("= 0.05", "= 0.1\norder = 2"), end=BODIES),
 }
@@ -52,6 +61,7 @@ def test_the_solver_is_the_one_that_is_reported(comm, name):
     (line,) = [line for line in printed.splitlines() if line.startswith("solver")]
     assert ("influence columns" in line) == (cell.solver.exact_inverse is not None)
     assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)
+    assert bool(re.search(r"^mix .* of glass, mean radius [\d.]+$", printed, re.MULTILINE)) == (name == "mix")
     assert_same_sizes(comm, printed, cell)
 
 

@@ -52,7 +52,7 @@ def test_the_stress_at_which_a_phase_fails_stands_beside_the_factor(comm, load, 
     """A uniform cell under S11 alone reaches its strength at S11 = 100; "von Mises" of a cell in plane stress."""
     result = result_of(comm, load, plane="stress", fibre=MATRIX, strengths=({"von_mises": 100.0}, None))
     *_, used = summary.phase_tables(result.document)
-    assert [column.name for column in used.columns if column.name.startswith("at ")] == heads
+    assert [column.name for column in used.columns if column.name.startswith("at S")] == heads
     expected = [100.0] if heads else [*factors(result).values()]
     assert [row[-1] for row in used.rows] == pytest.approx(expected, rel=1e-8)
 

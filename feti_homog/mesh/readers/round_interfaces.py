@@ -78,9 +78,8 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
 
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
-    of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. Other
-    interfaces do not change; a remark names polygons within NEARLY_ROUND. In triangles with two edges on one ellipse,
-    the third edge flips.
+    of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
+    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces within NEARLY_ROUND.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -110,8 +109,7 @@ def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coa
     """Bend each interface edge to the circle through both ends and the middle node.
 
     Edges on circles and ellipses do not change, nor do edges without a middle node, or with a middle node within
-    STRAIGHT edge lengths of the chord. In triangles with two edges on one curve, which has no corner there, the third
-    edge flips.
+    STRAIGHT edge lengths of the chord. The third edge flips in triangles with two edges on one smooth curve.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]

@@ -12,6 +12,10 @@ FAULTY_TABLES = {
     "missing column": ("x,radius\n1,2\n", "t.csv: row 1: column y: missing"),
     "missing radius": ("x,y,phase\n1,2,fibre\n", "t.csv: row 1: column radius: missing"),
     "one semi-axis": ("x,y,a\n1,2,3\n", "t.csv: row 1: column b: missing"),
+    "two units": (
+        "x [mm],y/mm,d (um),angle [deg]\n1,2,3,4\n",
+        "t.csv: row 1: columns in mm and um: expected one unit of length",
+    ),
     "column twice": ("x,y,radius,X\n1,2,3,4\n", "t.csv: row 1: column x: the name is there twice"),
     "too short a row": (HEAD + ROW + "1,2\n", "t.csv: row 3: has 2 columns; expected 3, one for each name"),
     "too long a row": (HEAD + "1,2,3,4\n", "t.csv: row 2: has 4 columns; expected 3, one for each name"),

@@ -190,3 +190,15 @@ def test_straight_edges_of_a_users_mesh_have_the_remark_of_generated_cells(name,
     assert (lost > 0.005) == (not more)
     text = f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2"
     assert [remark for remark in result.remarks if "order" in remark] == [text] * (not more)
+
+
+def test_a_matrix_within_a_fibre_is_remarked():
+    """The fibre around the matrix has no radius."""
+    material = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
+    for exchanged in (False, True):
+        names = ("matrix", "fibre")[:: -1 if exchanged else 1]
+        cell = {"geometry": "mesh", "file": "square.msh", "phases": dict(zip(("matrix", "fibre"), names, strict=True))}
+        document = {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
+        lines = describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF).splitlines()
+        assert any("are its phase and another exchanged?" in line for line in lines) == exchanged
+        assert any(re.match("fibres .*mean radius .*, fraction", line) for line in lines) != exchanged
