@@ -228,7 +228,7 @@ def _law_warnings(case: Case) -> list[str]:
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften
 
-    lines, law = [], law_of_sections(case.interfaces, np.zeros(0, np.int64))
+    lines, law = [], law_of_sections(case.interfaces, np.arange(len(case.interfaces)))
     for section, bond in interface_section.labelled(case.interfaces):
         stiffness, strength, toughness = (
             getattr(bond, f"tangential_{kind}") / getattr(bond, f"normal_{kind}")

@@ -136,6 +136,17 @@ def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():
     assert "for sigma_c = sqrt(2 k_n G_Ic) = 90, " in line and f"= {2790.0 / (1 - 0.33**2) / 4050:.3g} long" in line
 
 
+@pytest.mark.parametrize("tolerance", [0.02, 0.2])
+def test_teeth_above_the_peak_traction_are_warned_of_in_any_section(tolerance):
+    pairs = ((), (["coating", "matrix"],), (["coating", "matrix"], ["fibre", "coating"]))
+    for between in pairs:
+        bond = COHESIVE | {"softening_tolerance": tolerance}
+        bonds = [bond | {"between": pair} for pair in between] or bond
+        case = cases.parse(DOCUMENT | {"interface": bonds, "cell": CELL | {"coating": 0.1}}, Path())
+        lines = [line for line in cell_remarks.warnings(case, 20.0, 1e-3, np.array([7.5])) if "first tooth" in line]
+        assert len(lines) == (tolerance > 0.05), between
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 1.0, 100.0, 1e4])
 def test_a_toughness_in_another_unit_is_doubted(factor):
     """E' G / N^2 in shear is 0.078 micrometres long, 0.0104 radii; ratios below 0.01 or above 100 are unlikely."""
