@@ -1,5 +1,6 @@
 """Runs of the command line for the tests of it."""
 
+import os
 import signal
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -33,7 +34,8 @@ def in_process(*words: str | Path) -> CompletedProcess[str]:
     Options of PETSc, which starts once in a process, and tests of the process itself need `command_line`.
     """
     output, errors = StringIO(), StringIO()
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())  # programs that a test starts later would inherit more
+    # Programs that a test starts later would inherit more.
+    blocked, environment = signal.pthread_sigmask(signal.SIG_BLOCK, ()), dict(os.environ)
     try:
         with redirect_stdout(output), redirect_stderr(errors):
             code = cli.main([str(word) for word in words])
@@ -41,6 +43,8 @@ def in_process(*words: str | Path) -> CompletedProcess[str]:
         code = int(str(end.code or 0))
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        os.environ.clear()
+        os.environ.update(environment)
     return CompletedProcess(words, code, output.getvalue(), errors.getvalue())
 
 
