@@ -51,6 +51,8 @@ def test_one_arrangement_has_no_scatter_in_its_errors():
     (line,) = case_remarks(Case.parse(random))
     assert line.startswith('[cell] seed = 7: "+-" has mesh errors, no scatter')
     assert not case_remarks(Case.parse(random | {"output": {"mesh_error": False}})) + case_remarks(Case.parse(content))
+    loaded = random | {"analysis": {"type": "load", "plane": "strain"}, "load": {"to": {"E11": 0.01}}}
+    assert not case_remarks(Case.parse(loaded))
 
 
 @pytest.mark.parametrize("key", [{"teeth": 3}, {"softening_tolerance": 0.15}, {}], ids=str)
