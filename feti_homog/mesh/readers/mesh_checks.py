@@ -39,7 +39,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
     for names, number in zip([mesh.groups[group] for group in used], first, strict=True):
         if len(names) > 1:
             counts = f"is in {len(names)} {mesh.container}s: {', '.join(names)}"
-            faults.append(f"{mesh.element(int(number))} {counts}; [cell.phases] names the phases among them")
+            faults.append(f"{mesh.element(int(number))} {counts}; [cell.phases] names one phase, or change the groups")
     return faults
 
 
