@@ -111,16 +111,17 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
     order = np.lexsort((edge, -area[edge], body))
-    triangle, edge = triangle[order], edge[order]
+    edge = edge[order]
     bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
+    triangle, k = triangle[order][first], k[order][first]
     outer, period = ellipses[edge[first]], torus.mesh.period
     offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
     is_off_centre = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
     is_round = np.bincount(place, np.isnan(torus.edge_circles[edge, 2]), len(bodies)) == 0
     is_concentric = (np.bincount(place, is_off_centre, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
-    middles = torus.mesh.points[torus.edges[edge[first]]].mean(axis=1)
-    inward = middles - torus.mesh.points[torus.mesh.triangles[triangle[first]]].mean(axis=1)
-    is_concentric &= (inward * (middles - outer.centres)).sum(axis=1) > 0
+    start, stop = (torus.mesh.points[torus.mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
+    to_centre = (outer.centres - start + period / 2) % period - period / 2
+    is_concentric &= np.linalg.det(np.stack([stop - start, to_centre], axis=1)) > 0
     return bodies[is_concentric], edge[first][is_concentric], is_round[is_concentric]
 
 

@@ -85,7 +85,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
-UNIT = re.compile(rf"([\[(/_\s]\s*({UNITS})(\^?[2²])?\s*[\])]?|\[[^][]*\]|\([^()]*\)|/[^/]+)$", re.IGNORECASE)
+UNIT = re.compile(rf"([\[(/_\s]({UNITS})(\^?[2²])?[\])]?|\[[^][]*\]|\([^()]*\)|/[^/]+)$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"

@@ -79,8 +79,7 @@ def mesh_of(grid: Grid) -> RawMesh:
 
     The cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.  Without `phase`, the first of NUMBERS in
     the grid, or else the only cell data of whole numbers, groups the triangles.  The optional cell data `debonded` are
-    1 on lines that are debonded from the start.  All other lines form one curve for each number or, with `phase`, a
-    single curve `line`.
+    1 on initially debonded lines.  Other lines form a curve for each number or, with `phase`, a single curve `line`.
 
     Raises:
         MeshError: the grid has other cells or no phases.
