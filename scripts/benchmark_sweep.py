@@ -1,4 +1,4 @@
-"""Compare run times: a sweep on one rank, a sweep with a case on each rank, and CHOLMOD on the same meshes.
+"""Time a sweep on one rank, the same sweep with one case per rank, and CHOLMOD on the meshes of the sweep.
 
 All three are whole commands, start-up included, run in turns.
 The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor

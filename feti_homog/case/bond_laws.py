@@ -42,8 +42,8 @@ class BondLawEntry:
             return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
         if name == COHESIVE[0] and "between" in table:
             return f"{fault}; bonds that hold have 100 times the strengths and 1e4 times the toughnesses of others"
-        such = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
-        return f"{fault}, such as {such}" if name == STIFFNESSES[0] else fault
+        hint = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
+        return f"{fault}, such as {hint}" if name == STIFFNESSES[0] else fault
 
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")

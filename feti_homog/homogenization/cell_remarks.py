@@ -61,8 +61,8 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     lost = cut_off(torus.mesh, case.cell.refine) if case.cell.has_own_mesh and case.cell.order == 1 else 0.0
     if lost > SAME_RATIO / 2:
         lines.append(f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2")
-    at_side = (torus.mesh.representative[torus.mesh.triangles] != torus.mesh.triangles).any(axis=1)
-    if case.cell.has_own_mesh and torus.mesh.phase[at_side].all():
+    cell, matrix = case.cell, torus.mesh.triangles[torus.mesh.phase == 0]
+    if cell.has_own_mesh and cell.boundary == "periodic" and (torus.mesh.representative[matrix] == matrix).all():
         lines.append("[cell] the matrix reaches no side of the cell: are its phase and another exchanged?")
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))

@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The round fibres of one phase, with one radius; `springs` is None if the interface is not elastic."""
+    """Round fibres of one phase and of equal radii; `springs` is None for perfect bonding."""
 
     fraction: float
     constants: TransverseIsotropy

@@ -149,7 +149,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Return both bounds (P) of the potential under a load, by a state with the same bonds; infinite if not valid."""
+    """Return lower and upper bounds (P) of the potential by a state `other`; infinite if other stresses are given."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)

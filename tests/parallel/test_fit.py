@@ -27,7 +27,7 @@ def glass():
 @pytest.mark.one_rank
 @pytest.mark.parametrize("name", ["boron/aluminium, square", "AS4/3501-6"])
 def test_data_without_noise_return_the_truth(comm, shared_path, name):
-    """Within eight evaluations; intervals and shares are those of the normal equations."""
+    """Eight evaluations suffice; intervals and shares agree with the normal equations."""
     values, derivatives = model(name, comm)([*truth(name).values()])
     found = run_fit(fit(name, values), shared_path / "out", comm)
     estimates = {key: own["estimate"] for key, own in found["unknowns"].items()}

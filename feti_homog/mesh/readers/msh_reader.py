@@ -249,8 +249,8 @@ def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Co
             if group and group[0] != phase_names.VOID:
                 shares[group[0]] = shares.get(group[0], 0.0) + percent
     usual = ("matrix", *materials, "fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1)))
-    tells = any("fib" not in name.casefold() for name in shares)  # numbers of an array are called fibre, fibre:2, ...
-    order = sorted(shares, key=lambda k: (tells and k in materials, tells and "fib" in k.casefold(), -shares[k]))
+    mixed = any("fib" not in name.casefold() for name in shares)  # numbers of an array are called fibre, fibre:2, ...
+    order = sorted(shares, key=lambda k: (mixed and k in materials, mixed and "fib" in k.casefold(), -shares[k]))
     others = [name for name in order if name != "matrix" and name not in phases]
     first = others[: not has_matrix]
     if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay

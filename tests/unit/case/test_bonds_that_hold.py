@@ -1,4 +1,4 @@
-"""An arc on a fibre that holds otherwise, beside fibres that debond: every pair of phases has the same law."""
+"""A debonded arc on a fibre with strong bonds, beside fibres with a cohesive law."""
 
 import pytest
 from mpi4py import MPI

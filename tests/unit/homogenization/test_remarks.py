@@ -204,3 +204,11 @@ def test_a_matrix_within_a_fibre_is_remarked():
         lines = describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF).splitlines()
         assert any("are its phase and another exchanged?" in line for line in lines) == exchanged
         assert any(re.match("fibres .*mean radius .*, fraction", line) for line in lines) != exchanged
+
+
+@pytest.mark.parametrize("boundary", ["displacement", "traction"])
+def test_sides_without_images_do_not_exchange_phases(boundary):
+    cell = {"geometry": "mesh", "file": "square.msh", "boundary": boundary}
+    material = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
+    document = {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
+    assert "exchanged" not in describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF)

@@ -90,7 +90,7 @@ def rubbing(point, status):
     ],
 )
 def test_heat_of_an_increment_is_that_of_its_slips(heat, method, broke, holds):
-    """Heat of the closed node alone: slip 0.1, traction 3, length 4, area 2; what was stored before is nothing."""
+    """Only the closed node makes heat: slip 0.1, traction 3, length 4, area 2; the earlier state stores no energy."""
     place = SimpleNamespace(pair=np.zeros(3, int), fibre=np.ones(3, int), length=np.full(3, 4.0))
     points = [{"friction_heat": 1.0, "stored": stored, "broke": 0} for stored in (1e9, 1.0, 1.0)]
     points.append({"friction_heat": 1.0 + heat, "stored": 2.0, "broke": broke})

@@ -155,7 +155,7 @@ def test_rows_and_columns_are_scaled():
 
 @pytest.mark.parametrize(("some", "columns"), [(0, 3), (3, 1), (3, 900), (500, 40), (600, 900)])
 def test_product_with_some_columns(some, columns):
-    """By all columns, or by copies of those that count, in one part or in several."""
+    """Both ways agree with NumPy: a product with all columns, and products with copied columns in batches."""
     rng = np.random.default_rng(some)
     matrix, at = np.asfortranarray(rng.normal(size=(30, 700))), rng.permutation(700)[:some]
     x = rng.normal(size=(some, columns))
