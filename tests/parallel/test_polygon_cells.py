@@ -77,4 +77,7 @@ def test_polygons_debond_and_are_certified(comm, shared_path):
     }
     result = run(case_of(table(*ROWS[:2], mesh_size=0.4), **sections), comm, out=shared_path / "run")
     assert result.path[-1].debonded_share > 0.2
+    perimeters = np.array([0.8 * 6 * 0.25 + 0.2 * 2 * np.pi * 0.25 * np.cos(np.pi / 6), 2 * np.pi * 0.2])
+    for point in (result.path[0], result.path[-1]):  # angles of a polygon are fractions of 360
+        assert point.debonding_angle == pytest.approx(360.0 * point.debonded_length / perimeters, rel=1e-6)
     assert_certified(comm, shared_path / "run")

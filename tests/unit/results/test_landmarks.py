@@ -116,12 +116,12 @@ def test_drops_of_six_components_are_those_of_the_tensor() -> None:
 
 
 def test_under_a_given_stress_the_jump_of_the_strain_is_a_drop() -> None:
-    """On the first leg rays of rising compliance: at load 0.5 from point 0 to the branch of point 3."""
-    load, compliance = (0.5, 0.4, 0.45, 0.8, 1.0), (1.0, 1.5, 1.8, 2.0, 2.0)
+    """On the first leg rays of rising compliance: at load 0.5 from point 0 to the branch of point 2."""
+    load, compliance = (0.5, 0.4, 0.8, 1.0), (1.0, 1.5, 2.0, 2.0)
     points = [in_space(c * t, t, t) for t, c in zip(load, compliance, strict=True)]
-    assert kept(points, "peaks", 1) == [0, 1, 3, 4]
+    assert kept(points, "peaks", 1) == [0, 1, 2, 3]
     # The largest strain is 2, the largest stress 1: the jump by 0.5 is a quarter of both.
-    assert (pytest.approx(0.25), 0, 3) in drops(points, 1)
+    assert (pytest.approx(0.25), 0, 2) in drops(points, 1)
 
 
 def test_on_later_legs_bonds_that_break_at_one_load_make_a_jump() -> None:

@@ -65,20 +65,24 @@ def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, 
     assert marks(document)[peak["event"]].removeprefix("first break and ") == mark
 
 
-def test_an_unfinished_path_has_its_largest_stress_so_far_at_the_largest() -> None:
-    document = along([10.0, 60.0, 40.0, 90.0], 1) | {"unfinished": "by a limit"}
+@pytest.mark.parametrize("status", [{"unfinished": "by a limit"}, {}])
+def test_an_unfinished_path_has_its_largest_stress_so_far_at_the_largest(status: dict[str, str]) -> None:
+    """So has a path that ended below its load without a fall."""
+    document = along([10.0, 60.0, 40.0 if status else 60.0, 90.0, 0.0], 1) | status
+    del document["path"][-1]
     words = " ".join(" ".join(_peak_lines(document, peak_of(document))).split())
     assert words.startswith("Largest S11 so far, the path being cut off: 90 at")
     assert "; then" not in words and "; later" not in words
 
 
 def test_the_last_closed_loop_of_friction_is_between_ends_of_legs() -> None:
-    """Up, down and up again, with two points at the second waypoint: the first and third leg end at one strain."""
-    document = along([1.0, 2.0, 1.0, 0.0, 0.1, 1.0, 2.0])
-    document["case"]["path"] = {"method": "increments", "waypoints": [[0.01, 0, 0], [0.0, 0, 0], [0.01, 0, 0]]}
-    strains, loads = (0.005, 0.01, 0.005, 0.0, 0.0, 0.005, 0.01), (0.5, 1.0, 1.5, 2.0, 2.0, 2.5, 3.0)
+    """Down and up twice, with two points at the second waypoint: the first, third and fifth leg end at one strain."""
+    document, unloaded = along([0.0] * 11), {"stored": 0.0, "stored_in_springs": 0.0, "dissipated": 0.0}
+    waypoints = [[0.01, 0, 0], [0.0, 0, 0], [0.01, 0, 0], [0.005, 0, 0], [0.01, 0, 0]]
+    document["case"]["path"] = {"method": "increments", "waypoints": waypoints}
+    strains, loads = (5, 10, 5, 0, 0, 5, 10, 8, 5, 8, 10), (0.5, 1.0, 1.5, 2.0, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
     for k, (strain, load, point) in enumerate(zip(strains, loads, document["path"], strict=True)):
-        energies = {"stored": 0.0, "stored_in_springs": 0.0, "dissipated": 0.0, "dissipated_strain_controlled": 0.0}
-        counts = {"bonded": 0, "open": 0, "closed": 1, "debonded_share": 1.0, "friction_heat": 0.0}
-        point |= energies | counts | {"strain": [strain, 0.0, 0.0], "load_factor": load / 3, "work": 1.0 + k * k}
-    assert "area of the last closed loop 35" in " ".join(_path_energies(document, ""))
+        counts = {"bonded": 0, "open": 0, "closed": 1, "debonded_share": 1.0, "dissipated_strain_controlled": 0.0}
+        energies = unloaded | {"friction_heat": 0.25 * k, "work": 1.0 + k * k}
+        point |= energies | counts | {"strain": [strain / 1000, 0.0, 0.0], "load_factor": load / 5}
+    assert "Heat of friction per area (MPa): 2.5, area of the last closed loop 64" in _path_energies(document, " (MPa)")

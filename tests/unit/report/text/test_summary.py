@@ -70,6 +70,7 @@ def test_the_summary_says_what_was_computed() -> None:
     assert "fibre fraction 0.400000 (matrix 0.600000, fibre 0.400000)" in text
     assert line(text, "E1").split() == ["E1", "128", "nu12", "0.380000"]
     assert line(text, "bulk H").split()[-3:] == ["103.3", "103.33", "104.8"]
+    assert line(text, "C11 Reuss").split()[-3:] == ["140", "149.69", "160"] and "outside" not in text
     assert line(text, "Memory").endswith("200 MiB per rank at most")
     assert "Effective stiffness (GPa)" in text and "1.73205 mm" in text
     assert line(text, "Status").split() == ["Status", "done"]
@@ -105,23 +106,35 @@ def test_what_is_unknown_is_left_out() -> None:
     document = changed(something_else={"a": 1})
     document["case"]["output"] = {}
     document["bounds"]["hashin_shtrikman"] = None
+    document["effective_stiffness"][1][1] = 161.0
     text = summary(document)
     assert "GPa" not in text and "Hashin" not in text and "()" not in text
+    assert [row.split()[-1] for row in text.splitlines() if "Reuss, Voigt" in row] == ["160", "outside", "53"]
 
 
 def counted(bonded: int, **values: Any) -> dict[str, Any]:
     return values | {"bonded": bonded, "open": 9, "closed": 1, "iterations": 7}
 
 
-def test_an_angle_is_a_table_of_stiffnesses() -> None:
+@pytest.mark.parametrize("size", [3, 6])
+def test_an_angle_is_a_table_of_stiffnesses(size: int) -> None:
     stiffness = [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]
+    if size == 6:
+        stiffness = [[10.0 * min(i, j) + max(i, j) for j in range(1, 7)] for i in range(1, 7)]
     document = changed(angle=[counted(20 - k, angle=90.0 * k, stiffness=stiffness) for k in (0, 4)])
     del document["effective_stiffness"], document["moduli"], document["bounds"]
     document["case"]["analysis"]["type"] = "angle"
     text = summary(document)
     assert text.startswith("pair: debonding angle, plane strain") and max(map(len, text.splitlines())) < 80
-    assert line(text, "angle ").split() == ["angle", "C11", "C22", "C12", "C33", "bonded", "open", "closed"]
-    assert line(text, "360 ").split() == ["360", "9", "8", "2", "3", "16", "9", "1"]
+    head, numbers = (line(text, start).split() for start in ("angle ", "360 "))
+    # Each of the three unit strains opens and closes other nodes.
+    words = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
+    assert (words in text) == (size == 3)
+    if size == 6:
+        assert numbers == ["360", *(name.removeprefix("C") for name in head[1:])] and len(numbers) == 8
+    else:
+        assert head == ["angle", "C11", "C22", "C12", "C33", "bonded", "open", "closed"]
+        assert numbers == ["360", "9", "8", "2", "3", "16", "9", "1"]
 
 
 def test_a_path_is_a_table_of_chosen_points() -> None:
@@ -212,10 +225,14 @@ def test_the_state_under_a_load_is_reported() -> None:
 
 
 def test_bounds_are_those_of_bonded_cells_only() -> None:
-    document = changed(effective_stiffness_compression=[[150.0, 57, 0], [57, 150, 0], [0, 0, 46]])
+    names, numbers = ("effective_stiffness", "effective_stiffness_compression"), ([0.25, 0.5, 0.0], [0.75, 1e-3, 2.0])
+    errors = {name: [row] * 3 for name, row in zip(names, numbers, strict=True)}
+    document = changed(effective_stiffness_compression=[[150.0, 57, 0], [57, 150, 0], [0, 0, 46]], mesh_error=errors)
     document["case"]["interface"] = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
     text = summary(document)
     assert "Under minus E (GPa)" in text and "Bounds" not in text and "moduli" not in text
+    rows = [row.split()[1:] for row in text.splitlines() if row.startswith("  S11")]
+    assert rows[1::2] == [["2.5e-01", "5.0e-01", "0.0e+00"], ["7.5e-01", "1.0e-03", "2.0e+00"]] and len(rows) == 4
 
 
 def tips_of(*tips: tuple[Any, ...]) -> dict[str, Any]:
@@ -253,6 +270,7 @@ def test_energy_release_rates_against_the_angle() -> None:
         | states
     ]
     lines = summary(bonding(angle=given)).splitlines()
+    assert "C33: shear" not in "".join(lines)
     where = lines.index("Largest energy release rate (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]
 

@@ -1,4 +1,4 @@
-"""Tables as text and HTML: of points, envelopes and angles, and of constants in space."""
+"""Tables as text and HTML: of points and envelopes, and of constants in space."""
 
 import re
 from typing import Any
@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.constant_tables import cell_constants, moduli, stiffnesses
-from feti_homog.report.text.point_tables import angle_table, components, envelope_table
+from feti_homog.report.text.point_tables import components, envelope_table
 from feti_homog.report.text.summary import STRESSES, phase_tables
 from feti_homog.report.text.tables import Column, Table
 
@@ -103,15 +103,6 @@ def test_places_of_largest_stresses_are_coordinates_with_a_unit(unit, head):
     for table in (largest, used):
         heads, (cells,) = table.lines[1], table.lines[2:3]
         assert heads.index(head) + len(head) == cells.index("0.25, 0.5") + len("0.25, 0.5")
-
-
-def test_counts_of_nodes_of_an_angle_name_their_unit_strain():
-    """Each of the three unit strains opens and closes other nodes."""
-    counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
-    words = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
-    stiffness, stress = {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}, {"stress": [1.0, 2.0, 3.0]}
-    assert words in angle_table({"case": {}, "angle": [counts | stiffness]}).lines
-    assert words not in angle_table({"case": {}, "angle": [counts | stress]}).lines
 
 
 CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviation": 0.002}
