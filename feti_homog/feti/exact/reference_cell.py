@@ -262,24 +262,20 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 
 
 class BondedInverse(Preconditioner):
-    """The preconditioner z = H r, with the exact inverse H from a factored cell.
+    """The preconditioner z = H r, with the exact inverse H from a factored cell whose rows are all active.
 
-    Unlike `ExactInverse`, this preconditioner factors the cell for every new set of active rows.
+    It serves subdomains across materials, where no bond can break.
     """
 
     is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective."""
-        self._operators, self._one_sided = operators, one_sided_jumps(operators)
-        self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
+        """Factor the cell; all boundary operators must be dense.  Collective."""
+        self._cell = ReferenceCell(operators, one_sided_jumps(operators), np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:
-        """Factor the cell if `active` (owned rows,) has changed; active rows must hold all bodies.  Collective."""
-        if self._operators.comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
-            self._cell.destroy()
-            self._cell = ReferenceCell(self._operators, self._one_sided, active)
+        """Do nothing: all rows stay active."""
 
     def apply(self, r: Float) -> Float:
         """Compute H r for r (owned rows,) or (owned rows, k).  Collective."""
-        return self._cell.respond(distributed_arrays.scale_rows(self._cell.active, r))
+        return self._cell.respond(r)
