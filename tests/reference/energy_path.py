@@ -11,6 +11,7 @@ from scipy.sparse import diags, identity
 from scipy.sparse.linalg import splu
 
 from reference.load_path import SlowLoadPath
+from reference.mixed_path import tips
 from reference.quadratic_programme import QuadraticProgramme
 
 SLIGHT = 1e-14  # share of the largest stiffness that makes that of free fibres definite
@@ -40,23 +41,13 @@ class SlowEnergyPath:
         psi = np.arctan2(np.sqrt(GII), np.sqrt(GI))
         energy = GI + GII
         if self.growth == "released":
-            tips = self.tips(bonded)
+            edge = tips(self.programme, bonded)
             # The last bond of a fibre has no force, and rounding a sign.
-            energy[tips] = np.maximum(self.released(state, bonded, tips), 0.0) / self.programme.lengths()[tips]
+            energy[edge] = np.maximum(self.released(state, bonded, edge), 0.0) / self.programme.lengths()[edge]
         critical = self.toughness * (1 + np.tan((1 - self.mode_sensitivity) * psi) ** 2)
         return state, np.sqrt(energy / critical) * bonded
 
-    def tips(self, bonded):
-        """Bonded nodes beside one that is not, around each fibre."""
-        programme, found = self.programme, np.zeros(len(bonded), bool)
-        for f in np.unique(programme.fibre):
-            own = np.flatnonzero(programme.fibre == f)
-            own = own[np.argsort(programme.angle[own])]
-            broken = ~bonded[own]
-            found[own] = bonded[own] & (np.roll(broken, 1) | np.roll(broken, -1))
-        return np.flatnonzero(found)
-
-    def released(self, state, bonded, tips):
+    def released(self, state, bonded, edge):
         """(t,) energies that the single breaks release at fixed strain, with the faces that touch as they are.
 
         The springs have lam = k j go, and their ends part by (1 - A k)^-1 j, A being the compliance of the cell with
@@ -74,7 +65,7 @@ class SlowEnergyPath:
         # Free fibres as a whole have no stiffness, and the springs of tips no part in their motions.
         factor = splu(K + SLIGHT * K.diagonal().max() * identity(K.shape[0], format="csc"))
         energies = []
-        for i in tips:
+        for i in edge:
             J = np.stack([(R[i] @ T).toarray().ravel() for R in rows])
             A, k, j = J @ factor.solve(J.T), np.diag(stiff[i]), state.jump[i]
             parted = np.linalg.solve(np.eye(2) - A @ k, j)

@@ -5,13 +5,12 @@ cell with the program, nothing else; contact is found as in `quadratic_programme
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import block_diag, coo_matrix, csr_matrix, diags, hstack, identity
 
 from reference import monolithic
-from reference.quadratic_programme import minimise, nearest, rigid_motions, torus_keys
+from reference.quadratic_programme import QuadraticProgramme, minimise, nearest, rigid_motions, torus_keys
 
 LOADS = 7  # six strains and a temperature
 PLANE = [0, 1, 5]
@@ -62,6 +61,8 @@ def is_isotropic(C):
 class SpatialProgramme:
     """The cell of parts; with `centres` and `radii` of round fibres it has the interface nodes, sorted by `key`."""
 
+    lengths = QuadraticProgramme.lengths
+
     def __init__(self, parts, size, centres=(), radii=()):
         self.size = np.array(size)
         labels = [np.stack([np.full(len(p.points), p.body), torus_keys(p.points, size)], axis=1) for p in parts]
@@ -109,19 +110,6 @@ class SpatialProgramme:
             self.rigid[inside, i, fibre[inside], i] = 1.0
         self.rigid[inside, :2, fibre[inside], 3] = arm[inside][:, ::-1] * [-1, 1] / radii[fibre[inside], None]
 
-    @cached_property
-    def lengths(self):
-        """(k,) tributary arc lengths: halves of the arcs between linear nodes, Simpson's shares of quadratic ones."""
-        result = np.zeros(len(self.key))
-        for f in np.unique(self.fibre):
-            own = np.flatnonzero((self.fibre == f) & ~self.middle)
-            own = own[np.argsort(self.angle[own])]
-            arc = np.radians(np.diff(self.angle[own], append=self.angle[own[0]] + 360)) * self.radius[own]
-            result[own] = (1 / 6 if self.middle.any() else 1 / 2) * (arc + np.roll(arc, 1))
-            middles = np.flatnonzero((self.fibre == f) & self.middle)
-            result[middles] = 4 / 6 * arc[np.searchsorted(self.angle[own], self.angle[middles]) - 1]
-        return result
-
     def secants(self, sign=1.0, bonded=None, contact=False, springs=None):
         """(7, 7) columns: sign times what works on each load under sign times each unit load.
 
@@ -136,14 +124,14 @@ class SpatialProgramme:
         T, K = self._together(bonded if springs is None else np.zeros_like(bonded)), self.K
         if springs is not None:
             for stiffness, jump in zip((springs[0], springs[1], springs[-1]), self._jumps(bonded), strict=True):
-                K = K + jump.T @ diags(stiffness * self.lengths[bonded]) @ jump
+                K = K + jump.T @ diags(stiffness * self.lengths()[bonded]) @ jump
         own, f = (T.T @ K @ T).tocsc() / self.scale, -T.T @ (self.Q @ load) / self.scale
         gaps = (self._jumps(~bonded)[0] @ T).tocsr()[: len(closing)]
         C, give = gaps, 0
         if springs is not None:
             # How far the springs of touching faces give way is an unknown of its own.
             give = len(closing)
-            own = block_diag([own, diags(springs[0] * self.lengths[closing] / self.scale)]).tocsc()
+            own = block_diag([own, diags(springs[0] * self.lengths()[closing] / self.scale)]).tocsc()
             f, C = np.r_[f, np.zeros(give)], hstack([gaps, identity(give)]).tocsr()
 
         def motions(active):
