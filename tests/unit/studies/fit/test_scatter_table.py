@@ -22,26 +22,28 @@ def test_stresses_have_their_unit_and_strains_none():
         "stress_unit": "MPa", "cells": 1, "parameters": [{"name": "material.matrix.young", "by": "differences"}],
         "results": [scatter | {"name": name} for name in ("onset_S11", "peak_E11", "E_axial")],
     }  # fmt: skip
-    rows = [line.split("  ")[1] for line in scatter_text(document).splitlines() if " 30 " in line]
-    assert rows == ["onset_S11 (MPa)", "peak_E11", "E_axial (MPa)"]
+    text = scatter_text(document)
+    rows = [line.split("  ")[1] for line in text.splitlines() if " 30 " in line]
+    assert rows == ["onset_S11 (MPa)", "peak_E11", "E_axial (MPa)"] and "Negative shares" not in text
     del document["stress_unit"]  # as files of earlier versions
     assert "onset_S11  " in scatter_text(document)
 
 
 def test_every_number_stands_under_its_head():
-    """Deviations by inputs 3 and between cells 4, together 5, of two results with their errors of the mesh."""
+    """Deviations by inputs 3 and between cells 4, together 5, of two results; a third has no scatter."""
     names = ("material.matrix.young", "interface.normal_stiffness")
     rows = [
         {"name": "C11", "value": 30.0, "std_inputs": 3.0, "std_cells": 4.0, "std": 5.0, "mesh_error": 0.25},
         {"name": "nu12", "value": 0.5, "std_inputs": 0.03, "std_cells": 0.04, "std": 0.05, "mesh_error": None},
+        {"name": "C12", "value": 9.0, "std_inputs": 0.0, "std_cells": 0.0, "std": 0.0, "mesh_error": None},
     ]
-    shares = [[1.25, -0.25], [0.36, 0.64]]
+    shares = [[1.25, -0.25], [0.36, 0.64], [0.0, 0.0]]
     document = {
         "stress_unit": "GPa", "cells": 3,
         "parameters": [{"name": names[0], "by": "derivatives"}, {"name": names[1], "by": "differences"}],
         "results": [
             row | {"shares": own, "derivatives": [1.0, -2.0], "derivative_errors": errors}
-            for row, own, errors in zip(rows, shares, ([0.4, 1.1], [0.6, 0.9]), strict=True)
+            for row, own, errors in zip(rows, shares, ([0.4, 1.1], [0.6, 0.9], [9.0, 9.0]), strict=True)
         ],
     }  # fmt: skip
     lines = scatter_text(document).splitlines()
@@ -57,6 +59,8 @@ def test_every_number_stands_under_its_head():
     assert lines[6] == "Negative shares: correlated numbers act against each other"
     assert lines[7].startswith("+- mesh: for stiffnesses, constants, conductivities alone")
     assert lines[8:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]
+    document["results"][1]["mesh_error"] = 0.01
+    assert "+- mesh: for" not in scatter_text(document)
 
 
 @pytest.mark.parametrize("leading", [0, 1])
