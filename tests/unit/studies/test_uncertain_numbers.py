@@ -123,8 +123,8 @@ def test_impossible_correlations_are_refused():
 
 
 def test_scatter_and_shares_of_first_order_have_their_closed_form():
-    """Changes 0.3 and 0.8 by one deviation each, correlated by 0.5: 0.09 + 0.64 + 0.24 = 0.97 is the variance."""
+    """Changes 0.3 and +-0.8 by one deviation each, correlated by 0.5: 0.09 + 0.64 +- 0.24 is the variance."""
     numbers = Uncertainty({"a": 0.1, "b": 0.2}, (("a", "b", 0.5),))
-    std, shares = numbers.propagated(np.array([[3.0, 4.0], [0.0, 0.0]]))
-    assert std == pytest.approx([0.97**0.5, 0.0]) and shares[0] == pytest.approx([0.21 / 0.97, 0.76 / 0.97])
-    assert shares[1].tolist() == [0.0, 0.0]
+    std, shares = numbers.propagated(np.array([[3.0, 4.0], [0.0, 0.0], [3.0, -4.0]]))
+    assert std == pytest.approx([0.97**0.5, 0.0, 0.7]) and shares[1].tolist() == [0.0, 0.0]
+    assert shares[[0, 2]] == pytest.approx(np.array([[0.21, 0.76], [-0.03, 0.52]]) / [[0.97], [0.49]])

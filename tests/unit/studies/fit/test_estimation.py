@@ -95,4 +95,6 @@ def test_units_do_not_decide_where_the_search_ends():
         bounds=bounds,
     )
     other = fitted(decay(TRUTH))
+    singular_values = np.linalg.svd(slopes(TRUTH) * TRUTH / 0.01, compute_uv=False)
+    np.testing.assert_allclose(found.singular_values, singular_values, rtol=1e-6)
     assert found.x == pytest.approx(TRUTH * unit, rel=1e-9) and found.evaluations == other.evaluations

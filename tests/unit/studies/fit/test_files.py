@@ -77,7 +77,9 @@ def test_every_printed_number_is_that_of_the_normal_equations():
     J, computed = np.array([[0.2, 1.0], [0.4, 0.5], [0.05, 0.3]]), y + np.array([3.0, -1.5, 0.25])
     bounds = np.array([50.0, 50.0]), np.array([500.0, 120.0])
     estimates = summarize(x, computed, (y, std), J, bounds)
-    text = study_tables.fit_text(estimation.fit_document(asked.unknowns, asked.data, estimates))
+    document = estimation.fit_document(asked.unknowns, asked.data, estimates)
+    text = study_tables.fit_text(document)
+    assert [(datum["test"], datum["name"]) for datum in document["measured"]] == [(1, "C11"), (1, "C22"), (1, "G12")]
     covariance = np.linalg.inv(J.T @ (J / std[:, None] ** 2))
     deviation, shares = np.sqrt(covariance.diagonal()), (covariance @ J.T / std) ** 2
     blocks = [[line.split() for line in part.splitlines()] for part in text.split("\n\n")]
