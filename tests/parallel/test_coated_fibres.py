@@ -111,5 +111,6 @@ def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
         "path": {"waypoints": [{"E11": -0.01, "E22": -0.004}, {"gamma12": 0.02}]},
         "output": {"pictures": False, "states": "all"},
     }
-    run(Case.parse(document), comm, out=shared_path / "out")
+    result = run(Case.parse(document), comm, out=shared_path / "out")
+    assert result.path[-1].debonding_angle == pytest.approx([360.0])  # of both interfaces together
     assert_certified(comm, shared_path / "out")

@@ -124,14 +124,14 @@ def test_what_a_waypoint_does_not_name_stays_and_the_components_that_change_are_
 
 
 def test_the_strength_of_the_first_leg_is_the_peak_although_later_legs_strain_more() -> None:
-    """Tension breaks bonds, then compression with shear breaks more."""
+    """Tension breaks bonds, then compression with shear breaks more; E22 follows, and is largest on leg 2."""
     rows = [(4.0, 0.0), (5.0, 0.0), (3.0, 0.0), (-3.0, 0.0), (-3.0, 2.0), (-3.0, 1.0)]
     path = mixed([[0.5, 0, 0], {"S11": -3.0}, {"S11": -3.0, "gamma12": 9.0}], [[a, 0, b] for a, b in rows], "strain")
     loads = [0.2, 0.3, 1 / 3, 2 / 3, 0.9, 1.0]
     for entry, load, broke, gamma in zip(
         path["path"], loads, (0, 1, 1, 0, 0, 1), (0, 0, 0, 0, 20.0, 50.0), strict=True
     ):
-        entry |= {"load_factor": load, "broke": broke, "strain": [*entry["strain"][:2], gamma]}
+        entry |= {"load_factor": load, "broke": broke, "strain": [entry["strain"][0], 60.0 * load, gamma]}
     peak = peak_of(path)
     assert (peak["stress_name"], peak["stress"], peak["event"], peak["first_break_event"]) == ("S11", 5.0, 1, 1)
     assert peak["stress_left"] == 3.0 and peak["event_left"] == 2  # the second leg unloads, and is no fall
