@@ -45,6 +45,14 @@ def shared_path(comm: Any, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def elsewhere(tmp_path: Path) -> Path:
+    """Provide a folder far from the repository, with a name that shells and schedulers could misread."""
+    folder = tmp_path / "a place, 100%j"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
 def mpirun() -> Callable[..., Any]:
     return jobs.mpirun
 

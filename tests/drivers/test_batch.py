@@ -111,14 +111,6 @@ def submitted(scheduler, script, *words, code=0, cwd=ROOT):
     return job, notes.read_text().splitlines() if notes.exists() else []
 
 
-@pytest.fixture
-def elsewhere(tmp_path):
-    """Provide a folder far from the repository, with a name that shells and schedulers could misread."""
-    folder = tmp_path / "a place, 100%j"
-    folder.mkdir()
-    return folder
-
-
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_batch_scripts_are_sound_bash(path):
     subprocess.run(["bash", "-n", path], check=True)

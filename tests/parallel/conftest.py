@@ -37,6 +37,16 @@ def narrow():
 
 
 @pytest.fixture
+def strip(comm, shared_path):
+    """Provide a folder with the mesh of a strip of fibre normal to x1."""
+    from support.ranks import write_once
+    from unit.mesh.faulty_meshes import grid
+
+    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
+    return shared_path
+
+
+@pytest.fixture
 def shared_interfaces(comm, monkeypatch):
     """Assert that no rank of several owns all interface nodes of a cell that the test makes on all ranks."""
     from feti_homog.feti.decomposition.jump_operator import JumpOperator

@@ -83,13 +83,6 @@ def test_compression_breaks_no_bond_that_only_tension_breaks(comm):
     parallel_assert(comm, all(point.normal == pytest.approx(1.0) for point in result.envelope if point.factor))
 
 
-@pytest.fixture
-def strip(comm, shared_path):
-    """Provide a folder with the mesh of a strip of fibre normal to x1."""
-    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
-    return shared_path
-
-
 STRIP = {"cell": {"geometry": "mesh", "file": "strip.msh"}}
 ALONG = {"axial_strength": 1.5}
 IN_SPACE = {"max": MAX | ALONG, "quadratic": QUADRATIC | ALONG, "energy": ENERGY | {"axial_stiffness": 200.0}}

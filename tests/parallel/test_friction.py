@@ -85,9 +85,6 @@ def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plan
         run(Case.parse(short), comm, out=shared_path / "out")
     result = run(Case.parse(asked), comm, out=shared_path / "out", resume=True)
     assert sum(point.broke for point in result.path) > 10 and result.path[-1].friction_heat > 0.0
-    free = [number for number, angle in enumerate(result.path[-1].debonding_angle, 1) if angle > 359.9]
-    words = "no bond of fibre 1 holds" if len(free) == 1 else "no bond of 3 fibres (1, 2, 3) holds"
-    assert free == ([1] if law else [1, 2, 3]) and words in " ".join(result.document["remarks"])
     assert_certified(comm, shared_path / "out")
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, compare_paths, relative, solved
-from support.ranks import write_once
-from unit.mesh.faulty_meshes import grid
 
 from feti_homog.errors import ConvergenceError
 
@@ -85,13 +83,6 @@ def test_bonds_break_first_at_the_same_state_however_it_is_controlled(comm, plan
 def name_of(letter, pair):
     """E11, gamma12, S12, ..."""
     return ("gamma" if letter == "E" and pair[0] != pair[1] else letter) + pair
-
-
-@pytest.fixture
-def strip(comm, shared_path):
-    """Provide a folder with a laminate normal to x1."""
-    write_once(comm, grid(lambda x, y: 0.25 < x < 0.5), shared_path / "strip.msh")
-    return shared_path
 
 
 @pytest.mark.parametrize("plane", ["strain", "generalized"])

@@ -5,7 +5,6 @@ import os
 import re
 from pathlib import Path
 
-import pytest
 from support import events
 from support.base_case import with_lines
 from support.jobs import ROOT
@@ -20,14 +19,6 @@ PATH_CASE = with_lines(
     *("[cell] mesh_size = 0.03", "[interface] normal_strength = 5.0", "[interface] tangential_strength = 5.0"),
     *("[path] strain = [0.2, 0.0, 0.0]", '[output] states = "all"'),
 )
-
-
-@pytest.fixture
-def elsewhere(tmp_path):
-    """Provide a folder far from the repository, with a name that shells and SLURM could misread."""
-    folder = tmp_path / "a place, 100%j"
-    folder.mkdir()
-    return folder
 
 
 def submitted(slurm, folder: Path, script: str, *words: str, **variables: str) -> list[str]:

@@ -40,11 +40,6 @@ def compliances(springs, radius):
     return tuple(radius / (k * springs.radius) for k in (springs.normal, springs.tangential, springs.axial))
 
 
-def given(estimate):
-    """Return the values of an estimate by name."""
-    return {name: value for name, value in dataclasses.asdict(estimate).items() if value is not None}
-
-
 @every_pair
 @every_bond
 @pytest.mark.parametrize("c", [0.05, 0.4, 0.8])

@@ -104,11 +104,13 @@ def test_remarks_warnings_and_faults_are_reported_in_this_order() -> None:
 
 def test_what_is_unknown_is_left_out() -> None:
     document = changed(something_else={"a": 1})
-    document["case"]["output"] = {}
+    document["case"] |= {"output": {}, "cell": {"geometry": "hexagonal", "order": 2, "accuracy": 0.01}}
+    document["cell"] |= {"refine": 2, "mesh_size": 0.05}
     document["bounds"]["hashin_shtrikman"] = None
     document["effective_stiffness"][1][1] = 161.0
     text = summary(document)
     assert "GPa" not in text and "Hashin" not in text and "()" not in text
+    assert "refine 2 of mesh_size 0.05 for accuracy = 0.01" in " ".join(text.split())
     assert [row.split()[-1] for row in text.splitlines() if "Reuss, Voigt" in row] == ["160", "outside", "53"]
 
 

@@ -213,6 +213,7 @@ def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
     stiffness = documents[0]["effective_stiffness"]
     assert [table.outputs[f"C{i}{j}"][0] for i in range(1, 7) for j in range(1, 7)] == stiffness.ravel().tolist()
+    assert table.outputs["anisotropy_normal"] == pytest.approx([-0.007, -0.007, 0.993, 0.993])
     assert table.outputs["anisotropy_shear"][0] == pytest.approx(45.035 - (150.0 + 150.007 - 2 * 0.001) / 4)
     assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
     assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
