@@ -9,13 +9,14 @@ from feti_homog.homogenization import mesh_estimate
 
 
 def group(points, sides, first):
-    """Return a body of one triangle; its first `sides` sides lie on an arc, its forces begin at `first`."""
-    ends = np.array([[0, 1], [1, 2]])[:sides]
+    """Return a body of one quadratic triangle; its first sides lie on an arc, its forces begin at `first`."""
+    nodes = np.array([[0, 3, 1], [1, 4, 2]])[:sides]
+    places = np.concatenate([points, (points + np.roll(points, -1, axis=0)) / 2])
     stress = SimpleNamespace(
-        node_class=np.arange(3), triangles=np.arange(3)[None], problem=SimpleNamespace(components=2)
+        node_class=np.arange(6), triangles=np.arange(3)[None], problem=SimpleNamespace(components=2)
     )
     on_arc = SimpleNamespace(
-        element=np.zeros(sides, int), nodes=ends, points=np.array(points)[ends], at_void=np.zeros(sides, bool)
+        element=np.zeros(sides, int), nodes=nodes, points=places[nodes], at_void=np.zeros(sides, bool)
     )
     return mesh_estimate.Group(stress, on_arc, first + 2 * np.arange(3))
 
