@@ -126,6 +126,7 @@ def test_totals_and_rows_of_a_path():
     e, s = (np.array([point[name][0] for point in pulled]) for name in ("strain", "stress"))  # the others are free
     work = 0.5 * (s / e * (e**2 - np.r_[0.0, e[:-1]] ** 2)).sum() - 0.5 * s[-1] * e[-1]
     assert end["strain"][0] == 0.0 and all(point["broke"] for point in pulled[:-1])
+    assert not any("fracture_energy" in point for point in points)  # strengths alone know no toughness
 
     def number(start):
         return float(NUMBER.findall(next(line for line in lines if line.startswith(start)).partition(": ")[2])[0])
