@@ -44,7 +44,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
     """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.  Collective.
 
-    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).
+    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).  Maxwell's
+    estimate is None without `fibre_radii`, bounds are None with conductances.
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())

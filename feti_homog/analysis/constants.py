@@ -32,7 +32,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     Returns {} for a plane cell with interfaces, and if faces touch without tension, since each stiffness column is then
-    a secant under a different load.
+    a secant under a different load.  With voids, there are no bounds.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -102,7 +102,8 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     """Return a radius for each fibre phase, or None if closed forms do not apply.
 
-    Closed forms need round fibres without coatings, the same bonds for all phases and, for springs, equal radii.
+    Closed forms need round fibres without coatings, the same bonds for all phases and, for springs, equal radii in
+    each phase.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}

@@ -29,8 +29,8 @@ class CellLoads:
     """The loads of a cell, and averages over the cell under each load.
 
     Attributes:
-        problems: the plane problem, in which faces may touch, with the axial problem in generalized plane strain; or
-            conduction.
+        problems: the plane problem, in which faces may touch, and in generalized plane strain the axial problem; or
+            conduction alone.
         interfaces: the interfaces, coupled in all problems.
         names: names of the unit loads of all problems.
     """
@@ -206,7 +206,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return all iterations, and the debonding under the last plane response, by result.json names.  Collective."""
+        """Return the debonding under the last plane response, and all iterations, by result.json names.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -18,7 +18,7 @@ from feti_homog.system.petsc import options_database
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """Describe a run of the case on these ranks, under its own options.  Collective.
+    """Describe a run of the case on these ranks, with the PETSc options of the case.  Collective.
 
     The text is empty except on rank 0.  Raises CaseError and MeshError as `unit_cell.tear` does.
     """

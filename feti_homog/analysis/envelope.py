@@ -47,7 +47,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
 
     `envelope` lists directions with the load at which the first bond breaks; all other entries follow from unit loads.
-    Raises CaseError if faces in the mesh are debonded and may touch.
+    Raises CaseError if faces in the mesh are debonded and may touch, and like `criterion_of`.
     """
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)

@@ -95,9 +95,9 @@ def _points(
 ]:
     """Yield each point with its responses.  Collective.
 
-    First come the `stored_events` of the checkpoint, with the numbers that `path_events.restored` adds, then new
-    points with None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no
-    equilibrium. Raises NotCarriedError if the cell does not carry the stresses of the first point.
+    First come the `stored_events` of the checkpoint, with the triple from `path_events.restored`, then new points with
+    None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no equilibrium.
+    Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))

@@ -81,7 +81,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) -> Iterator[unit_cell.TornCell]:
-    """Context manager: tear the cell while the PETSc options of the case are set.  Collective.
+    """Context manager: tear the cell, and free it at the end, under the PETSc options of the case.  Collective.
 
     Turns LinAlgError, from matrices singular by rounding, into ConvergenceError.
     """

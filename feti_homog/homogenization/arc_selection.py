@@ -41,7 +41,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    at least LEAST_SIZE, at most `interface_size`.  With several openings it may be larger, so that tips add at most
+    at least LEAST_SIZE, at most `interface_size`.  With several openings h_t may be larger, so that tips add at most
     TIP_TRIANGLES times the triangles of the mesh.  In paths and envelopes tips move: only `tip_size` sets a size there.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
@@ -73,7 +73,7 @@ class EstimatedNodes:
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
         """Place nodes on the chords that may debond, except vertices that never part.
 
-        `pairs` are as in `share_entities`; `numbers` (constituents,) are fibre numbers.
+        `pairs` are as in `share_entities`; `numbers` (constituents,) and `centres` (constituents, 2) are of fibres.
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]

@@ -53,7 +53,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh: polygons, interfaces without effect, soft springs, and nodes that never part.
+    """List remarks on a mesh: polygons, phases, interfaces without effect, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
@@ -110,7 +110,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on sides that are not periodic, or else on order, seed, teeth of `bonds` (0: unknown), fibres."""
+    """List remarks on sides that are not periodic; else on order, seed, teeth (of `bonds`, if known) and fibres."""
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -181,7 +181,7 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
-    """List warnings about cohesive laws, and process zones of unlikely lengths or that elements do not resolve.
+    """List warnings about cohesive laws, unlikely process zones, and elements that do not resolve a process zone.
 
     Args:
         width: cell width.

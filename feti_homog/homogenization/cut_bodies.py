@@ -130,7 +130,7 @@ def fits_across_cuts(
     """Fit recovered stresses at vertices on or next to cuts, over all pieces.  Collective.
 
     Returns:
-        For each mesh index, the vertex classes (n,) and their fits: p coefficients (n, p, m k) of m stresses, k loads.
+        For each mesh index, the vertex classes (n,) and fits (n, p, m k): p coefficients of m stresses under k loads.
     """
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]

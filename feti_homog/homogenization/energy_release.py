@@ -52,7 +52,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the derivative of the subdomain energy by the angle of a turning crack tip.
+        """Return the derivative of the subdomain energy with respect to the angle by which a crack tip turns.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.

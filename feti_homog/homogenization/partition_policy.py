@@ -68,8 +68,8 @@ class PartitionPolicy:
         strip_dofs: cells from this size on are halved into strips.  Smaller cells have short boundaries anyway, and the
             irregular cuts of METIS make their estimated mesh errors depend less on the direction.
 
-    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
-    `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
+    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the rules for bonded bodies,
+    `scripts/benchmark_path` the rules for bodies that may part, and `scripts/benchmark --table small` the last five.
     """
 
     piece_dofs: int = 2200

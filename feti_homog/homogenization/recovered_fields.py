@@ -128,9 +128,10 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(
     cell: TornCell, responses: Sequence[Response | None], out: Float
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
-    """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; write u* to `out` (dofs, s).
+    """Yield each phase with a chunk of e elements, and their stresses (2, s, 6, e, q).  Collective.
 
-    The second stress array has 0 in place of rounding errors.  States with a response None have 0.  Collective.
+    Writes u* to `out` (dofs, s).  The second stresses at the q points have 0 in place of rounding errors, and all are 0
+    in states without a response.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))

@@ -127,8 +127,8 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 class _Fields:
     """The fields in e elements at q points under k loads.
 
-    In mixed elements the energy is also stationary in the bubble; with the pressure lambda Pi div u, its density is
-    the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
+    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
+    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
 
     Attributes:
         gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).

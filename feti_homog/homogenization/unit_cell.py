@@ -203,7 +203,7 @@ def tear(
 ) -> TornCell:
     """Tear the cell of a case, and factor the subdomains.  Collective.
 
-    Raises CaseError and MeshError, on every rank, like `tile_tearing.cut`; `progress` reports the stages.
+    Raises on every rank, like `tile_tearing.cut` and `solver_plan.build`; `progress` reports the stages.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields

@@ -38,7 +38,9 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """The contact problem of all interfaces, with k nodes on this rank.  Methods that solve set the state of `solver`.
+    """The contact problem of all interfaces, with k nodes on this rank.
+
+    Methods that solve set the state of `solver`, and also raise like `FetiSolver.set_state` and `solve_many`.
 
     Attributes:
         solver: dual solver.
@@ -63,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        At debonded nodes only normal forces of closed nodes are active, with contact; all other multipliers are active.
+        All are active except at debonded nodes; there, with `contact`, the normal multipliers of closed nodes are.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -108,7 +110,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) after bonds `which` (k,) part: closed under pressure `lam` with contact, else open."""
+        """Return statuses (k,) after bonds `which` (k,) part: closed if `lam` (owned rows,) presses, with contact."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -144,7 +146,10 @@ class ContactProblem:
         return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return the state with amplitudes and jumps by the dual operator; unchanged if it has them.  Collective."""
+        """Return the state with amplitudes alpha and jumps by the dual operator.  Collective.
+
+        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha stays unchanged.
+        """
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
@@ -164,7 +169,11 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find statuses and solution under a load, from guessed bonds.  Collective; raises like `linear`."""
+        """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
+
+        If open faces do not carry the load, a second search begins with closed faces.  Raises like `linear` and
+        `FloatingBodies.place`.
+        """
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:
@@ -175,7 +184,7 @@ class ContactProblem:
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `linear`.
+        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `equilibrium`.
 
         The search gives up after MAX_CONTACT_SOLVES dual problems, or after a solve without convergence.
         """
@@ -249,8 +258,8 @@ class ContactProblem:
     ) -> Equilibrium:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
-        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and become open
-        if a fibre is free without these nodes.  The fibre then moves, if there is room, so that its faces part least.
+        Bonds and pressed faces resist motions.  Closed nodes without a force hold no fibre, and become open if a fibre
+        is free without these nodes.  If there is room, this fibre then takes the position with least squared jumps.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

@@ -80,7 +80,7 @@ class Equilibrium:
     Attributes:
         load: prescribed load.
         bonds: states of this rank's interface nodes.
-        solution: last dual solution.
+        solution: dual solution of the last solve.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists.
         certificate: errors by `kkt_errors`; with friction also `kkt_friction`.

@@ -54,7 +54,7 @@ class StatusSearch:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; the search
             ignores the conditions for a change to any other status.
         faces, load: the faces, and the prescribed loads and slips.
-        start: (m,) scaled x before the load, where free motions keep their amplitude.
+        start: (m,) scaled x before the load, from which free motions keep their amplitudes.
     """
 
     faces: FaceSystem
@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
+        """Yield admissible statuses and x: by pivots, with all sliding faces or one stuck first; then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -109,11 +109,11 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to the guess, and x; None also with too many candidates."""
+        """Return the first result of `_tried`; None also with too many candidates."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses and x, the closest to the guess first; nothing with too many candidates."""
+        """Yield all admissible statuses and x, fewest changes of the guess first; nothing with too many candidates."""
         choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
@@ -197,7 +197,7 @@ class CoulombFaces(FaceSystem):
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find the statuses (n,) and x (m,) at the end of an implicit step to a load; arguments as in `search`.
 
-        Raises as `search` does, and StuckError if all results have negative determinants.
+        Raises as `search` does, and StuckError if the determinant is negative and no other result has a positive one.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 
@@ -256,7 +256,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the lost energy and its heat on the straight path between states x at constant load."""
+        """Return the energy lost on the straight path between states x at constant load, and the heat in this loss."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

@@ -68,7 +68,7 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the factored response of `before` if it can grow; see `FollowedStatuses.grow`."""
+        """Take over the factored response of `before`, changed in place by `FollowedStatuses.grow`, if it can grow."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -144,7 +144,7 @@ class FaceSystem:
         return status_system.largest_share(unbalanced, sizes, slope) <= UNBALANCED
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with `start` in free entries, and the right-hand side (m,) in the load rows."""
+        """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

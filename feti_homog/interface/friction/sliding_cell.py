@@ -83,7 +83,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return the multipliers in owned rows (k, c).  Columns of these rows stay stored for the next call."""
+        """Return `multipliers` in owned rows (k, c); store the columns of these rows for a call with the same array."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -260,7 +260,7 @@ class SlidingCell:
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
         """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        All `loads` scale the certificate; its `kkt_friction` is the largest of `coulomb_errors` over the largest
+        All `loads` scale the certificate; `kkt_friction` is the largest of `coulomb_errors` relative to the largest
         traction.
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))

@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the next leg fraction, and the error that limits it; (`share`, None) also if no statuses fit."""
+            """Return the carried leg fraction, and the error beyond it; (`share`, None) also if the step is stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)
