@@ -16,9 +16,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries of a conductivity.  Collective.
 
     These are `effective_conductivity`, closed forms and, on request, sensitivities and mesh errors.  The flux q and the
-    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*:
-    axial shear with k as shear moduli.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.  Column j
-    of the result is -<q> under the unit gradient j.
+    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*,
+    as in axial shear with shear moduli k.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.
+    Column j of the result is -<q> under the unit gradient j.
     """
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     k = columns["stiffness"]

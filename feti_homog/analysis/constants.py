@@ -32,7 +32,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     Returns {} for a plane cell with interfaces, and if faces touch without tension, since each stiffness column is then
-    a secant under a different load.  With voids, there are no bounds.
+    a secant under a different load.  A cell with voids has no bounds.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -102,8 +102,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     """Return a radius for each fibre phase, or None if closed forms do not apply.
 
-    Closed forms need round fibres without coatings, the same bonds for all phases and, for springs, equal radii in
-    each phase.
+    Closed forms need round fibres without coatings, equal bonds for all phases and, with springs, one radius a phase.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
@@ -246,7 +245,10 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note a mesh error above `accuracy`, if any, under the first nonzero load, if the cell carries it.  Collective."""
+    """Note a mesh error above the `accuracy` of the case under the first nonzero load.  Collective.
+
+    The function returns at once without `accuracy` or `mesh_error`, and if the cell does not carry the load.
+    """
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

@@ -189,8 +189,8 @@ def _completed(
 ) -> dict[str, Any]:
     """Return the `Result` entries `path`, `peak` and `states` of a finished path.  Collective.
 
-    The function marks the landmarks, names the most utilised of the `bonds` there, and records tips and fields at the
-    kept points.  The checkpoint provides all kept points except the last.
+    Marks landmarks in `entries`, adds tips and mesh errors at the kept points, records fields there, and drops lists
+    over fibres elsewhere.  `peak` names the most utilised of `bonds`.  The checkpoint has all kept points but the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()

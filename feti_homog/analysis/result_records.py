@@ -1,7 +1,7 @@
 """Define the records of points, tips and mesh errors in result.json, which are fields of `result.Result`.
 
-Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
-plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
+Strains are [E11, E22, gamma12], in generalized plane strain [E11, E22, E33, gamma23, gamma13, gamma12].  Stresses are
+[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  They and energies per cell area have the unit of the moduli.
 """
 
 from collections.abc import Mapping

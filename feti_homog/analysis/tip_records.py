@@ -41,7 +41,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return energy release rates at all tips under in-plane `loads`.  They are empty without tips.  Collective."""
+    """Return energy release rates at tips under the in-plane loads among `loads`; empty without tips.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)

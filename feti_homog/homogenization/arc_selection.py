@@ -73,7 +73,7 @@ class EstimatedNodes:
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
         """Place nodes on the chords that may debond, except vertices that never part.
 
-        `pairs` are as in `share_entities`; `numbers` (constituents,) and `centres` (constituents, 2) are of fibres.
+        `pairs` are as in `share_entities`; fibres have `numbers` (constituents,) and `centres` (constituents, 2).
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]

@@ -53,7 +53,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh: polygons, phases, interfaces without effect, soft springs, and nodes that never part.
+    """List remarks on a mesh: polygons, exchanged phases, idle interfaces, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
@@ -97,7 +97,7 @@ def cut_off(mesh: CoarseMesh, refine: int) -> float:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain a subdomain count that differs from the requested number in one line; () without a difference."""
+    """Explain in one line why the subdomain count differs from the requested number; () without a difference."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -110,7 +110,10 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on sides that are not periodic; else on order, seed, teeth (of `bonds`, if known) and fibres."""
+    """List remarks on sides that are not periodic, else on order, seed, teeth and fibre fraction.
+
+    `bonds` is the number of bonds with teeth, 0 if unknown.
+    """
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"

@@ -194,10 +194,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[index], vector[index], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Pair the vertices on the body boundary with their neighbours.
-
-        `at_boundary` (n,) marks the shared vertices on the boundary.
-        """
+        """Pair vertices on the body boundary with neighbours; `at_boundary` (n,) marks shared boundary vertices."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary

@@ -240,10 +240,7 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the distance between the fibres and the matched table; None without a table.
-
-    Fibres have centres (n, 2) and radii (n,).
-    """
+    """Return the distance of fibres, `centres` (n, 2) and `radii` (n,), from the matched table; None without it."""
     if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours

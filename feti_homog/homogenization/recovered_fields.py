@@ -35,9 +35,11 @@ class RecoveredFields:
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
-        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; fluxes replace the axial shears.
+        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux replaces
+            the stresses 13, 23 and 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
-            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
+            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry, and
+            phases in conduction.
     """
 
     displacement: list[Float]
@@ -49,8 +51,8 @@ class RecoveredFields:
 class NodalFields:
     """The nodal fields of a state in the plane or the axial problem, with c displacements per node.
 
-    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the plane nodes of the parts; `traction` and `jump` (k, c)
-    at the interface nodes.
+    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the positions y of the parts' plane nodes, with the
+    macroscopic gradient H; `traction` and `jump` (k, c) at the interface nodes.
     """
 
     displacement: Float
@@ -61,8 +63,7 @@ class NodalFields:
 def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> RecoveredFields:
     """Recover the fields of all states, in one pass over the parts.  Collective.
 
-    Args:
-        states: responses of each problem in each state; a problem without a response has zero fields.
+    `states` has the responses of each problem in each state; a problem without a response has zero fields.
     """
     by_problem = [*zip((cell, cell.axial or cell), zip(*states, strict=True), strict=False)]
     u = [np.zeros((torn.offsets[-1], len(states))) for torn, _ in by_problem]
@@ -128,10 +129,10 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(
     cell: TornCell, responses: Sequence[Response | None], out: Float
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
-    """Yield each phase with a chunk of e elements, and their stresses (2, s, 6, e, q).  Collective.
+    """Yield the phase of each chunk of e elements, the chunk, and its stresses (2, s, 6, e, q).  Collective.
 
-    Writes u* to `out` (dofs, s).  The second stresses at the q points have 0 in place of rounding errors, and all are 0
-    in states without a response.
+    Writes u* to `out` (dofs, s).  The stresses at the q points come as computed, then with 0 in place of rounding
+    errors; they are 0 in states without a response.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
     u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))

@@ -1,13 +1,14 @@
 """Differentiate stiffness and conductivity with respect to constants of the case, without further solves.
 
-Let e_i be the strains and the other uniform loads under the unit load i.  A linear cell of area |UC| has stiffness C,
+Let e_i be the strains and the other uniform loads under the unit load i, and [u]_i the jumps at springs of stiffness k.
+A linear cell of area |UC|, with laws A of the phases, has the stiffness C,
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
 and because the fields make C_ij stationary, dC_ij has dA and dk in place of A and k, exactly for the discrete cell.
 Bodies enter only by the integrals, one per phase.  A cell with contact is linear as long as no face opens or closes.
 
-If all fibres grow, the fibre fraction f changes at the rate d f / d ln R = 2 f, and the stiffness at the rate of the
+If all radii R grow, the fibre fraction f changes at the rate d f / d ln R = 2 f, and the stiffness at the rate of the
 energy on a moving mesh with fixed nodal u - E x.  This is exact for the mesh, however nodes between the fibres move.
 """
 

@@ -139,7 +139,7 @@ class NestedInterior:
         mesh: joined mesh of the subdomains, with c displacements per node.
         fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
-        interior: the free displacements.
+        interior: factor for the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids and prescribed side tractions.
     """
 

@@ -122,7 +122,7 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Find the tips that a mesh moves to a vertex at most `limit` degrees away.
+    """Return the tips, as `MovedTips`, that a mesh moves to a vertex at most `limit` degrees away.
 
     `marks` are tips from the function `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
     """
@@ -170,7 +170,7 @@ def _end(arc: interface_section.Arc, half: float) -> float:
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults in debonded arcs of the interface `label`; fibres without a centre have NaN `centres` (n, 2)."""
+    """List the faults in debonded arcs of the interface `label`, for fibre `centres` (n, 2), NaN without a centre."""
     messages = []
     for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -78,7 +78,7 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) in the bond states."""
+        """Return the spring compliance C (owned rows,) in a bond state; without damage, `intact_compliance` itself."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -110,17 +110,17 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) after bonds `which` (k,) part: closed if `lam` (owned rows,) presses, with contact."""
+        """Return statuses (k,) as bonds `which` (k,) part: CLOSED if `lam` (owned rows,) < 0 in contact, else OPEN."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """Return the normal and tangential traction (k, 2), tension positive, or axial traction (k, 1)."""
+        """Return normal and tangential traction (k, 2), tension positive; in the axial problem the axial one (k, 1)."""
         return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:
-        """Return gap and slip (k, 2), matrix minus fibre, or slip along the fibre (k, 1)."""
+        """Return gap and slip (k, 2), matrix minus fibre; in the axial problem the slip along the fibre (k, 1)."""
         return np.asarray(solution.opening[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
@@ -171,8 +171,7 @@ class ContactProblem:
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
 
-        If open faces do not carry the load, a second search begins with closed faces.  Raises like `linear` and
-        `FloatingBodies.place`.
+        If open faces do not carry the load, closed faces are tried.  Raises like `linear` and `FloatingBodies.place`.
         """
         try:
             return self._search(load, bonds, start)
@@ -224,7 +223,7 @@ class ContactProblem:
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective.
 
-        Return the solution with the new positions, and the mask (k,).
+        Return the solution with new alpha and jumps, and the mask (k,).  Raises like `FloatingBodies.place`.
         """
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):

@@ -165,9 +165,10 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of a step at which the first value (k,) reaches 0 and -2 noise.
+    """Return the fractions of a step at which the first of k values reaches 0 and -2 noise.
 
-    Both are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` may be (k,).
+    The values go from `before` (k,) to `after` (k,); `noise` may be (k,).  Both fractions are 1 if all values end at or
+    above -2 noise, for such values may be the solver's error.
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]

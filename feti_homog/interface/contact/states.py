@@ -41,7 +41,7 @@ class BondState:
         pressed: (k,) bonds under compression, with the normal stiffness of undamaged bonds.
         gap_and_slip: (k, 2) with friction, jumps of debonded faces and the jumps that damage adds to bonds, 0 at intact
             bonds; None without friction.
-        sliding: (k,) sign with which the slip of a closed node grows, 0 if it sticks; None without friction.
+        sliding: (k,) sign with which the slip grows, 0 at nodes that do not slide; None without friction.
     """
 
     status: Status

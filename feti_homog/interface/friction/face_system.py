@@ -106,7 +106,7 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant with given statuses, 0 with free motions."""
+        """Return the sign of det M, see `status_system`, with given statuses; 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 

@@ -21,9 +21,9 @@ SAME_SHARE = 1e-9
 class Leg(ABC):
     """Leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
-    The loads `start` at s = 0 and `end` at s = 1 prescribe the same components as strains and as stresses.  Bonds break
-    at constant load: the state before a break is a point, and the path continues from the state after the break at the
-    same s. Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
+    The loads `start` at s = 0 and `end` at s = 1 prescribe stresses in the same components.  Bonds break at constant
+    load: the state before a break is a point, and the path continues from the state after the break at the same s.
+    Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
 
     Attributes:
         limit: error that stopped the last step short of its load, or None.
