@@ -129,7 +129,7 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: standard_streams.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Return a context without a folder; `states` = None records no states."""
+        """Return a context without a folder; without a recorder `states`, no fields are kept."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         return cls(CellLoads(cell, contact), CheckRecorder(cell.solver.rtol), recorder, progress)
@@ -173,7 +173,7 @@ class AnalysisContext:
     def record_unit_states(
         self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
     ) -> None:
-        """Record one state for each unit load, in its problem.  Collective."""
+        """Record a state for each unit load, named `label` + load; see `StateRecorder.record`.  Collective."""
         in_plane = len(self.plane.loads) * self.cell.solver.problem.turns
         pairs = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):

@@ -227,8 +227,8 @@ def consistent(context: AnalysisContext, count: int) -> int:
 def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective.
 
-    Completes and checks the last events, back to the point at which products F lambda with the dual operator F have
-    confirmed every problem.  Events are invalid from the first failed check or wrong mean on.
+    Completes and checks all events since products F lambda with the dual operator F last confirmed every problem.  A
+    failed check or a wrong mean makes its event and all later events invalid.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:

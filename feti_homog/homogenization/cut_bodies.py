@@ -34,7 +34,7 @@ class SharedVertices:
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the vertices and edges that several pieces share.  Collective."""
+        """Find the vertices and edges that several pieces share; `meshes` has pieces and their mesh.  Collective."""
         self._comm = comm
         # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
         # body, entity and position, and the vertex classes (e, m) along these edges.

@@ -49,7 +49,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate the stiffness with respect to all constants, by responses to unit loads.  Collective."""
+    """Differentiate the stiffness with respect to all constants, by unit-load responses of each cell.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
@@ -198,7 +198,7 @@ def _strains(slopes: Float, problem: Problem) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """Return int f f^T (n, n) for fields (e, q, n)."""
+    """Return int f f^T (n, n) for fields f (e, q, n) with integration weights (e, q)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 

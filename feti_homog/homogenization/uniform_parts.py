@@ -77,7 +77,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Return the mesh restricted to coarse triangles (t,), and the original numbers (c,) of its classes."""
+    """Return the mesh of the coarse triangles `members` (t,), and the original numbers (c,) of its classes."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
