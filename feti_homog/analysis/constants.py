@@ -123,7 +123,7 @@ def unit_errors(
     """
     if not context.case.output.mesh_error:
         return [], responses
-    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
+    from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
     errors: list[mesh_estimate.EnergyErrors] = []
     shared, keep = list[averaging.Response](), context.recovers_again
@@ -234,7 +234,7 @@ def state_error(
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
-    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
+    from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
     keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
     errors = [mesh_estimate.energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]

@@ -38,7 +38,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds, top = list[tuple[float, float]](), ""
-    may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line has reported it
+    may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line reports the fall
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' * bool(before)}"

@@ -113,7 +113,8 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
     """Find the triangles and edges along the border of a piece.
 
     `classes` (t, q) are the lattice node classes of all triangles.  Return the triangle (e,) at each border edge, the
-    position (e,) of the edge in the triangle, and the node classes (e, intervals + 1) along the edge.
+    position (e,) of the edge in the triangle, and the node classes (e, intervals + 1) along the edge, in the same order
+    on both sides of a cut.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)

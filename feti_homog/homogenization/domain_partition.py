@@ -82,7 +82,7 @@ class CellSummary:
 
     @property
     def coatings(self) -> Float:
-        """The coating thicknesses (fibres,), 0 without a coating, NaN if not round."""
+        """The coating thicknesses (fibres,), 0 without a coating, NaN if a thickness varies."""
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     @property

@@ -208,7 +208,7 @@ def boundary_tractions(
     length if the mesh is `nested`, else by the side length, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
-    sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
+    sums, of_node = list[Float](), np.append(lengths, 0.0)  # NONE reads the last entry
     for stress, sides, position in groups:
         ends = stress.node_class[sides.nodes[:, [0, -1]]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2

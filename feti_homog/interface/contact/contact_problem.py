@@ -30,7 +30,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import NEGLIGIBLE, Load, LoadScales, solve_load, unresisted
 from feti_homog.typing import Bool, Float, Int
 
-# Number of block pivots, from the last one with progress; the literature usually allows ten without progress.
+# Number of block pivots, counted from the last one with progress; the literature usually allows ten without progress.
 BLOCK_PIVOTS = 11
 # Number of dual problems after which the search gives up; the certificate then shows the errors.
 MAX_CONTACT_SOLVES = 500
