@@ -247,7 +247,7 @@ def state_error(
 def check_accuracy(context: AnalysisContext) -> None:
     """Note a mesh error above the `accuracy` of the case under the first nonzero load.  Collective.
 
-    The function returns at once without `accuracy` or `mesh_error`, and if the cell does not carry the load.
+    Notes nothing without `accuracy` or `mesh_error`, or if the cell does not carry the load.
     """
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return

@@ -46,7 +46,7 @@ def check_to_draw(directory: Path) -> str:
 def finished(directory: Path, case: Case, ranks: int) -> bool:
     """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
 
-    Raises CaseError if the result or checkpoint is damaged or of another case, or the checkpoint of other rank counts.
+    Raises CaseError if the result or checkpoint is damaged or of another case, or the checkpoint of another rank count.
     """
     path = directory / checkpoints.FOLDER / checkpoints.NAME
     if path.parent.is_dir():

@@ -38,8 +38,8 @@ class RecoveredFields:
         stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux replaces
             the stresses 13, 23 and 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
-            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry, and
-            phases in conduction.
+            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33, and phases in
+            conduction, have no entry.
     """
 
     displacement: list[Float]

@@ -121,7 +121,7 @@ def can_be_torn_by_tiles(
     """Return whether the ranks can cut the cell without the whole mesh.
 
     Arc tips, bodies cut by the sides, a given subdomain count, which may be below the tile count, and cells probably
-    small enough for cuts across materials need the whole mesh on one rank.  A user's mesh and a single tile are there.
+    small enough for cuts across materials need the whole mesh on one rank, like a user's mesh or a single tile.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:

@@ -65,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        All are active except at debonded nodes; there, with `contact`, the normal multipliers of closed nodes are.
+        All are active except at debonded nodes; there, with `contact`, only the normal multipliers of closed nodes are.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -110,7 +110,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) as bonds `which` (k,) part: CLOSED if `lam` (owned rows,) < 0 in contact, else OPEN."""
+        """Part bonds `which` (k,); return statuses: with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -171,7 +171,7 @@ class ContactProblem:
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
 
-        If open faces do not carry the load, closed faces are tried.  Raises like `linear` and `FloatingBodies.place`.
+        Tries a load that open faces do not carry with closed faces.  Raises like `linear` and `FloatingBodies.place`.
         """
         try:
             return self._search(load, bonds, start)

@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield admissible statuses and x: by pivots, with all sliding faces or one stuck first; then by trial."""
+        """Yield admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
