@@ -29,8 +29,8 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Follow the path of the case and return its `Result` entries.  Collective.
 
-    `path` has a point for each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and
-    `resumed` the number of points from the checkpoint.  Each new converged point is written to the checkpoint at once.
+    `path` has each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and `resumed` the
+    count of restored points; new converged points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
     """
     path, law = context.case.section, criterion_of(context.cell, grows=True)
     assert isinstance(path, load_sections.LoadPath)

@@ -110,7 +110,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Part bonds `which` (k,); return statuses: with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
+        """Part bonds `which` (k,); return status (k,): with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
