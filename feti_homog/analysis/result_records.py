@@ -53,8 +53,8 @@ class MeshErrors:
 class Tips:
     """The t tips at a path point, by fibre, interface and direction.
 
-    A tip is an intact bond next to a broken bond.  Its driving energy per area is compared with G_c(psi): the energy of
-    its spring or, where `growth` is "released", the energy that its break would release.
+    A tip is an intact bond next to a broken bond.  The driving energy per area, which compares with G_c(psi), is the
+    energy of the spring or, where `growth` is "released", the energy that a break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")

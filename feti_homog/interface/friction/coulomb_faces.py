@@ -212,9 +212,8 @@ class CoulombFaces(FaceSystem):
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find admissible statuses for which det M is not negative, and x; arguments as in `search`.
 
-        A fibre that a few faces pinch jams if all of these faces stick, and snaps through with a negative stiffness if
-        one of these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as
-        `step` does.
+        A pinched fibre jams if all faces that pinch it stick, and snaps through, with a negative stiffness, if one of
+        these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as `step` does.
         """
         status, x = self.search(status, allowed, load, start)
         if self.sign(status, load.by_stress) >= 0:

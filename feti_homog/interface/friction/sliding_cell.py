@@ -109,8 +109,8 @@ class CondensedProblem:
 class AxialFaces:
     """The axial part of the matrix S of `coulomb_faces`, with eliminated jumps g = K^-1 b E.
 
-    K is H_DD with springs.  A weak spring holds each row: HELD times the row's own diagonal entry of K, as other
-    entries may be far larger.
+    K is H_DD with springs.  A weak spring holds each row.  The spring's stiffness is HELD times the diagonal entry of K
+    in the same row, because entries in other rows may be far larger.
 
     Attributes:
         problem: condensed axial problem.
