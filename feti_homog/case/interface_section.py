@@ -74,7 +74,7 @@ class InterfaceSection:
     Without this section bonding is perfect. Several sections [[interface]], one per pair of phases, must have the same
     contact, scatter, and law with its teeth, branch and growth.
 
-    None stands for an unlimited strength.
+    None stands for an unlimited strength, stiffness or conductance.
     """
 
     contact: bool = key(

@@ -147,7 +147,7 @@ def estimate(
 def summarize(
     x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Gather estimates x (n,) with the values (m,) and derivatives (m, n) computed at x; the rest as in `estimate`."""
+    """Gather estimates x (n,), with values (m,) and derivatives (m, n) at x; other arguments are as in `estimate`."""
     y, std = measured
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)

@@ -155,7 +155,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """Compute the rotation matrix R (axes, axes) from x1 to x2."""
+    """Compute the matrix R (axes, axes) of the rotation by `degrees` from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

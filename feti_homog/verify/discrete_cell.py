@@ -128,7 +128,7 @@ class DiscreteCell:
 
     @property
     def porosity(self) -> float:
-        """Return the area fraction of voids.  It is 0 if every torn side has a partner."""
+        """Return the area fraction of voids.  It is 0 if no torn side is at a void."""
         return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
 
     @cached_property

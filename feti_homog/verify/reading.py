@@ -89,7 +89,7 @@ class State:
         status: (k,) values of `Status`.
         damage: (k,) from 0 (intact) to 1 (broken).
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
-        mesh_error: (m,) share of an element in the estimated energy error, NaN without an estimate.
+        mesh_error: (m,) estimated energy error of an element / energy of the cell, NaN without an estimate.
     """
 
     name: str

@@ -70,7 +70,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,) of n teeth at openings in one ratio, in the mode with larger end / delta_0."""
+        """Compute damage levels (n + 1,) of n teeth at openings in one ratio, in the mode with larger end / onset."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
