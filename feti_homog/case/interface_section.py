@@ -238,5 +238,5 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
 
 
 def labelled(sections: Sequence[T]) -> list[tuple[str, T]]:
-    """Return the interface sections with their labels in messages; several sections are numbered from 1."""
+    """Return pairs (label in messages, interface section); the labels of several sections are numbered from 1."""
     return [(f"interface {number}" if len(sections) > 1 else "interface", s) for number, s in enumerate(sections, 1)]

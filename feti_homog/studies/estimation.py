@@ -87,7 +87,7 @@ class ParameterEstimates:
 
     @property
     def correlation(self) -> Float:
-        """The correlation (n, n) of the estimates; NaN for undetermined unknowns."""
+        """The correlation (n, n) of the estimates; undetermined unknowns have a diagonal of NaN and zeros elsewhere."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.covariance / np.outer(self.std, self.std))
 

@@ -169,7 +169,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start.  After a misfit or CaseError, search from the best of `STARTS` points.  On rank 0."""
+        """Return the estimates from the start; after a misfit or CaseError, from the best of `STARTS`.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]

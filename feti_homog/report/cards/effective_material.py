@@ -45,7 +45,7 @@ class EffectiveMaterial:
         name: case name.
         version: program version.
         stress_unit: the case's label, empty if it has none.
-        symmetry: in words.
+        symmetry: a sentence for the comments of a card.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.

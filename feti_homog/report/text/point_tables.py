@@ -88,7 +88,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Describe the debonded percentage of the interfaces.  With several phase pairs, each has its own."""
+    """Describe the debonded percentage of all interfaces and, for several sections, of each phase pair."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
