@@ -60,7 +60,7 @@ class Fit(Study):
         """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict the output to numbers; ask for derivatives unless debonded faces may touch, but not on paths."""
+            """Restrict output to numbers, with derivatives of conductivities, and of stiffnesses without contact."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None

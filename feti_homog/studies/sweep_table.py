@@ -31,7 +31,7 @@ class Statistics:
 
     @classmethod
     def of(cls, samples: Float) -> Self:
-        """Compute statistics over the first axis of samples (n, ...), without NaN entries."""
+        """Compute statistics of the finite samples (n, ...) over the first axis."""
         is_known = np.isfinite(samples)
         count = is_known.sum(axis=0)
         several = np.where(count > 1, count, np.nan)

@@ -32,7 +32,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section.get("damage", 0.0), float)
 
     def jumps(self, traction: Float) -> Float:
-        """Compute the jumps t / ((1 - d) k) (k, c), with d = 0 for normal compression."""
+        """Compute the jumps t / ((1 - d) k) (k, c), with d = 0 for normal compression and broken bonds."""
         share = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
         shares = np.repeat(share, traction.shape[1], axis=1)
         shares[:, 0] = np.where(traction[:, 0] > 0.0, shares[:, 0], 1.0)
@@ -60,7 +60,7 @@ class Cohesive(QuadraticStrength):
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """Compute traction components / strengths (k, c); all slips of equal energy have equal shares."""
+        """Compute traction / strength (k, c), slips times sqrt(k_t / k_c): slips of equal energy have equal shares."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]

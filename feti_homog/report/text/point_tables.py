@@ -129,7 +129,7 @@ def envelope_table(document: Document, limit: int | None = None) -> Table:
 
 
 def components(point: Point) -> tuple[float, float]:
-    """Return both components of the onset load."""
+    """Return both components, factor * (cos, sin), of the load at onset in a direction."""
     angle, load = radians(point["angle"]), float(point["factor"])
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
