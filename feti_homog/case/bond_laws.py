@@ -36,7 +36,7 @@ class BondLawEntry:
     softens: bool = False
 
     def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
-        """Word the fault of a required key that a table lacks, with a value that the user may choose."""
+        """Return the fault of the required key `name` that a table lacks, in most cases with a possible value."""
         fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
             return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"

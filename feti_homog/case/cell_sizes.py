@@ -42,7 +42,7 @@ def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tup
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases with a Poisson's ratio above a limit; none in plane stress and conduction."""
+    """List the isotropic phases with Poisson's ratio above a limit; none in plane stress and conduction."""
     if not voigt.PLANE_STATES[plane].locks:
         return []
     lines = []

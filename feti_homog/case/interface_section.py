@@ -74,7 +74,7 @@ class InterfaceSection:
     Without this section bonding is perfect. Several sections [[interface]], one per pair of phases, must have the same
     contact, scatter, and law with its teeth, branch and growth.
 
-    None stands for an unlimited strength.
+    None stands for an unlimited strength, stiffness or conductance.
     """
 
     contact: bool = key(
@@ -238,5 +238,5 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
 
 
 def labelled(sections: Sequence[T]) -> list[tuple[str, T]]:
-    """Return the interface sections with their labels in messages; several sections are numbered from 1."""
+    """Return pairs (label in messages, interface section); the labels of several sections are numbered from 1."""
     return [(f"interface {number}" if len(sections) > 1 else "interface", s) for number, s in enumerate(sections, 1)]

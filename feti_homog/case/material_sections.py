@@ -77,7 +77,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell | None, materials: object) -> list[str]:
-    """List coatings without a material, and a coating material without coatings; [] for a user's mesh."""
+    """List coatings without a material, and coating materials without coatings; [] for faulty sections or own mesh."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())

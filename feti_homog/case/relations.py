@@ -123,7 +123,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
 
 
 def _written(value: Any) -> str:
-    """Format the value of a key on which all interfaces must agree, as in TOML."""
+    """Format the value of a key on which all interfaces must agree, as in TOML; "none" for None."""
     table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
 

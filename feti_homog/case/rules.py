@@ -78,7 +78,7 @@ class Rule:
 
 
 def has(table: Any, *names: str) -> bool:
-    """Return whether a value is a table that has all these keys."""
+    """Return whether a value is a table with all the keys `names`."""
     return isinstance(table, dict) and {*names} <= table.keys()
 
 
@@ -246,7 +246,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test; true without sections, or if one is not a table."""
+    """Return whether an [interface] section passes a test or is not a table; true without the key `interface`."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 

@@ -163,7 +163,7 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
 def _command(
     commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
 ) -> Parser:
-    """Add a command that calls the function `action`, "module.function", and return its parser."""
+    """Add a command with the name of the function that it calls, `action` = "module.function"; return its parser."""
     parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
     parser.set_defaults(action=action)
     return parser

@@ -22,7 +22,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep, with the status unless `directory` is None.  On one rank."""
+    """Return a line for each case of a sweep, with status and reason unless `directory` is None.  On one rank."""
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
@@ -157,7 +157,7 @@ class CaseRunner:
         """Run cases until no free case remains; show the progress if `shows`.  Collective in the group.
 
         The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
-        Returns the error that stopped the group, or None.
+        Returns the error that stopped the group, or None; raises the error if other ranks of the group do not arrive.
         """
         timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"

@@ -87,7 +87,7 @@ class ParameterEstimates:
 
     @property
     def correlation(self) -> Float:
-        """The correlation (n, n) of the estimates; NaN for undetermined unknowns."""
+        """The correlation (n, n) of the estimates; undetermined unknowns have a diagonal of NaN and zeros elsewhere."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.covariance / np.outer(self.std, self.std))
 
@@ -147,7 +147,7 @@ def estimate(
 def summarize(
     x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Gather estimates x (n,) with the values (m,) and derivatives (m, n) computed at x; the rest as in `estimate`."""
+    """Gather estimates x (n,), with values (m,) and derivatives (m, n) at x; other arguments are as in `estimate`."""
     y, std = measured
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)

@@ -60,7 +60,7 @@ class Fit(Study):
         """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict the output to numbers, with derivatives unless debonded faces may touch."""
+            """Restrict output to numbers, with derivatives of conductivities, and of stiffnesses without contact."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None
@@ -169,7 +169,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start.  After a misfit or fault, search from the best of `STARTS` points.  On rank 0."""
+        """Return the estimates from the start; after a misfit or CaseError, from the best of `STARTS`.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]

@@ -40,7 +40,7 @@ class Datum:
 
 
 def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
-    """Yield the reasons why a case cannot compute measured values; a reason begins with `place`."""
+    """Yield the reasons why a case cannot compute measured values; `place` begins the reasons about a value."""
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":
@@ -99,8 +99,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return, by name, the result numbers that a study of scatter reports.
 
-    These are the constants of a stiffness, the entries of a conductivity, the onset and peak of a path, and the numbers
-    at the points of other analyses.
+    They are a stiffness's constants, a conductivity's entries, onset and peak of a path, or numbers of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:

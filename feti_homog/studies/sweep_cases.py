@@ -151,7 +151,7 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the sweep cases, unchecked, with their documents; [] after faults, which are appended to `faults`.
 
-    The cases run through all points; further `realisations`, if not None, follow, only of points with a random cell.
+    The cases run through all points; further `realisations`, if not None, follow at points with a random cell.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
     if realisations is not None and not any(map(_is_random, documents)):

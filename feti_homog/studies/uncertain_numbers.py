@@ -51,7 +51,10 @@ class Uncertainty:
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers, and leave their means in the document; append all faults to `faults`."""
+    """Extract the uncertain numbers, and leave their means in the document.
+
+    Appends all faults to `faults`; the result then has no numbers, or impossible correlations.
+    """
     table = document.pop(sections.UNCERTAINTY, {})
     if not isinstance(table, dict):
         name = sections.UNCERTAINTY
@@ -109,7 +112,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 def _means(
     value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
 ) -> Any:
-    """Replace uncertain numbers in a value by means; append paths and deviations to `given`, lines to `faults`."""
+    """Return a value with means of its uncertain numbers; append (path, deviation) to `given`, lines to `faults`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]

@@ -37,7 +37,7 @@ def plot(
     number, label or mark, only state_K.png is drawn.  Call on one rank.
 
     Raises:
-        CaseError: the result has no such state or component.
+        CaseError: the result is damaged, or has no such state or component.
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
     """
     directory, paths = Path(directory), list[Path]()

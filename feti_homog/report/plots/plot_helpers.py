@@ -145,7 +145,7 @@ def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, 
 def add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
     """Add triangles to the axes as pixels, also in vector graphics.
 
-    Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.
+    Matplotlib's `tripcolor` makes paths of all triangles to find limits, which takes longer than the rest of a plot.
     """
     x, y = points.T
     mesh = TriMesh(Triangulation(x, y, triangles), rasterized=True)

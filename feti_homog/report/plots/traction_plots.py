@@ -104,7 +104,8 @@ def _limit(column: Sequence[Axes]) -> None:
 def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw; return their names in result.h5.
 
-    For a path: peak (or first state), then valley or last state with tractions; else the middle of partial debonding.
+    A path gives the state at the peak (or the first), and the state in the valley after the peak (or the last with
+    tractions).  Other analyses give the middle one of the partly debonded states (or the last with tractions).
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}

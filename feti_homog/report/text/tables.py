@@ -95,7 +95,7 @@ class Table:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text, the title replaces the head of the first column.
         abreast: rows per line of text, without heads; 0 for one row per line with heads.
-        most_columns: largest number of columns after the first; others form blocks below.  Blocks omit unknown rows.
+        most_columns: largest number of columns after the first; others form blocks below.  Blocks omit rows of UNKNOWN.
     """
 
     title: str
