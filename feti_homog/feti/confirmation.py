@@ -38,7 +38,7 @@ class InfluenceSolutions:
         self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Solve for loads (k, v) by influence columns, or return None if F lambda is due.  Collective.
+        """Solve for loads `strains` (k, v) by influence columns, or return None if F lambda is due.  Collective.
 
         F lambda is due if the quota is used up, if the jump of a load on the active rows is at most LEAST_FOLLOWED
         times its jump on all rows, or if influence columns and coarse space disagree about the number of free motions.

@@ -124,7 +124,8 @@ class ActiveJumps:
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
         """Return the sum of k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
 
-        If all have alpha, the sum has alpha, the most iterations and a new residual, else the numbers of the first.
+        If all solutions have alpha, the sum has alpha, the most iterations, the least reason and a new residual; else
+        alpha is None, and the other numbers are from the first solution.
         """
         triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
         strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)

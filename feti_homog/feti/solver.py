@@ -144,7 +144,7 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute area Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
+        """Compute area Sigma (v,) = torn_stiffness E + d^T lam and for tractions -int u* (x) n ds (m,).  Collective."""
         local = self.d.T @ solution.lam
         if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:
             local = local + self._pushes.T @ alpha[self.natural.owned_modes]

@@ -97,7 +97,7 @@ class NaturalCoarseSpace:
     def _gram(self) -> GramMatrix:
         """Return the matrix G^T A G; a row between two bodies stores 36 products.  Collective when first read.
 
-        Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
+        Modes of the pinned body are left out: its pieces are glued together and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
@@ -126,7 +126,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x (owned rows,) or (owned rows, k), with 0 on inactive rows.  Collective."""
+        """Compute P x for x (owned rows,) or (owned rows, k) that is 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:

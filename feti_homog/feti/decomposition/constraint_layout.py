@@ -198,7 +198,7 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Find the m interface nodes with their first copy in the outer body on this rank.
+        """Find the m interface nodes whose first copy, a node of the outer body, is on this rank.
 
         Returns the first local row (m,) of each bond, and the local node number (m,) of each copy.
         """

@@ -148,7 +148,7 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L (v + m, v + m), padded with 0 for the m tractions on sides."""
+        """Return |Omega| L (v, v), with tractions on the sides padded by 0 to (v + m, v + m)."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C
@@ -167,8 +167,8 @@ class Subdomain:
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
-        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to its stiffness, perhaps far above all forces.  Else, the result is `answers`.
+        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion; else
+        the result is `answers`.  Rounding in K+ Q, times the stiffness of the body, may far exceed all forces.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers

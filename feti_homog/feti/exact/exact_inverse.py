@@ -161,7 +161,10 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global `rows`; `needed` ones stay.  False if asymmetry exceeds `max_error`.  Collective."""
+        """Follow columns at global `rows`; columns at `needed` rows stay.  Collective.
+
+        Returns False, and follows none, if `ReferenceChanges.error` of the columns exceeds `max_error`.
+        """
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -187,7 +190,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def rounding(self) -> float:
-        """The relative rounding error of the reference cell's H.  Collective when first read for a reference cell.
+        """Return the relative rounding error of the reference cell's H.  Collective when first read for this cell.
 
         Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
@@ -214,7 +217,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Returns None unless `free` pins exist; the cell is then factored anew if it has changed.
+        possible positions.  Returns None unless `free` pins exist; then a changed cell is factored anew.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:

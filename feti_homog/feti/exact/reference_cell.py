@@ -206,7 +206,7 @@ class ReferenceCell:
     def _without_springs(self, x: Float) -> Float:
         """Compute Gamma x without the springs at nodes of A where both bodies are cut.  Collective.
 
-        With x = (g, f), u = B_D^T g + Z y such that Z^T (S u - B_I^T f) = 0; then B_A^T lam = S u - B_I^T f.
+        With x = (g, f): u = B_D^T g + Z y, Z^T (S u - B_I^T f) = 0, B_A^T lam = S u - B_I^T f, gap = -B_I u - C_I f.
         """
         operators, jump_operator = self._operators, self._jump_operator
         g, f = distributed_arrays.scale_rows(self.active, x), distributed_arrays.scale_rows(1.0 - self.active, x)

@@ -86,11 +86,7 @@ class DirectSolver:
     """A solver X = A^-1 B for one symmetric definite matrix A (n, n) on one rank."""
 
     def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
-        """Factor A = `matrix`, by default by CHOLMOD's Cholesky; see `factored`.
-
-        Raises:
-            LinAlgError, MemoryError, CaseError: as in `factored`.
-        """
+        """Factor A = `matrix`, by default by CHOLMOD's Cholesky; `is_ordered` and exceptions are as in `factored`."""
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
         self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD, is_ordered=is_ordered)

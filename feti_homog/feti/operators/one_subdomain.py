@@ -86,9 +86,9 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by a symmetric matrix, `diagonal` (n,) and a triangle (`lower` 0 or 1), into `out` if given.
+        """Multiply x by the symmetric matrix of a `diagonal` (n,) and the upper (`lower` 0) or lower (1) triangle.
 
-        A product is fastest for x in Fortran order.
+        The product goes into `out` if given, and is fastest for x in Fortran order.
         """
         A = self._both
         if out is None:

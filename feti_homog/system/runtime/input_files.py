@@ -63,9 +63,9 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 
 
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
-    """Return function(path), computed in a child process with at most `memory` further bytes.
+    """Return function(path), which is picklable and computed in a child process with at most `memory` further bytes.
 
-    The child ends with this process, after `seconds` of processor time (None: by file size), or 30 times as long.
+    The child ends with this process, after `seconds` of processor time (None: by file size), or 30 `seconds` in all.
 
     Raises:
         FetiHomogError: the function raises it.
