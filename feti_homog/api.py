@@ -176,7 +176,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
 
 def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
-    """Start PETSc with options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError (faulty), LibraryError."""
+    """Start PETSc with options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError and LibraryError."""
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]

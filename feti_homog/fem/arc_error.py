@@ -22,8 +22,7 @@ class ArcSides:
 
     Attributes:
         element, side: (f,) element number, and number of the corner at which the side starts.
-        nodes: (f, p + 1) plane nodes along the side.
-        points: (f, p + 1, 2) node positions.
+        nodes, points: (f, p + 1) plane nodes along the side, and (f, p + 1, 2) their positions.
         normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
         area: (f,) area that the body lacks between the side and the arc, negative for a surplus.
         at_void: (f,) whether a void is on the right.

@@ -82,7 +82,10 @@ def assemble(
 
 @lru_cache(maxsize=16)  # pieces of a label image have few different classes
 def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
-    """Return a matrix (blocks, t p) that sums couples to blocks of K, the block columns, and each row's first block."""
+    """Return a matrix (blocks, t p) that sums couples to blocks of K, the block columns, and each row's first block.
+
+    `classes` holds the bytes of the node classes (t, q) of all coarse triangles; K has (n, n) blocks.
+    """
     of_triangle, macro = np.frombuffer(classes, np.int32).reshape(-1, len(lattice.nodes)), MacroElement.of(lattice)
     rows, columns = of_triangle[:, macro.rows], of_triangle[:, macro.columns]
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()

@@ -121,7 +121,7 @@ class MixedElements:
 
     @classmethod
     def of(cls, points: Float, L: Float) -> MixedElements:
-        """Compute the gradients and weights of mixed elements with the nodes (e, 6, 2)."""
+        """Compute gradients, weights and projections of mixed elements with nodes (e, 6, 2) and stiffness L (v, v)."""
         g, w = gradients(points, with_bubble=True)
         linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
         mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
@@ -229,9 +229,8 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
 
     Args:
         points, u: (e, a, 2) element nodes and their displacements.
-        L: (3, 3) stiffness.
+        L, is_mixed: (3, 3) stiffness, and whether the elements have a bubble and a pressure.
         moved, changed: (e, a, 2) dx and du.
-        is_mixed: whether the elements have a bubble and a pressure.
     """
     fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
     grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)

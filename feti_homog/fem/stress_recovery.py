@@ -42,9 +42,8 @@ class RecoveredStress:
     """The element stresses and the recovered stresses under k loads, in subdomains of one phase.
 
     Attributes:
-        points: (n, 2) positions of the plane nodes.
+        points, node_class: (n, 2) positions and (n,) classes of the plane nodes.
         triangles: (e, 3 or 6) plane nodes of the elements.
-        node_class: (n,) class of every plane node.
         L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) macroscopic strains and other loads.
@@ -151,7 +150,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex: in order 1, p = 1 value."""
+        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; of 1 alone in order 1."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]

@@ -47,7 +47,7 @@ class FetiSolver:
         interface_operators: S and S+ of the local subdomains.
         intact_compliance: (owned rows,) C of the intact springs.
         operator: F + C.
-        preconditioner: M^-1, or H_0 with the adaptive coarse space.
+        preconditioner: M^-1, or H_0 with the adaptive coarse space, or an exact inverse H.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         natural: rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
@@ -144,7 +144,10 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute area Sigma (v,) = torn_stiffness E + d^T lam and for tractions -int u* (x) n ds (m,).  Collective."""
+        """Compute the stress integral torn_stiffness E + d^T lam (v,) of a solution.  Collective.
+
+        With tractions on the sides, -int u* (x) n ds (m,) follows the stress integral.
+        """
         local = self.d.T @ solution.lam
         if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:
             local = local + self._pushes.T @ alpha[self.natural.owned_modes]
@@ -205,8 +208,8 @@ class FetiSolver:
         """Solve the dual problems for k loads together.  Collective.
 
         One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` reports convergence.
-        With tractions on the sides, the solutions that gave `closure` are superposed; raises like `closure`.  With
-        influence columns, raises like `InfluenceSolutions.record`.
+        For loads (k, v) and tractions on the sides, the solutions that gave `closure` are superposed; raises like
+        `closure`.  With influence columns, raises like `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.

@@ -95,14 +95,14 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return the matrix G^T A G; a row between two bodies stores 36 products.  Collective when first read.
+        """Return G^T A G, which stores 36 products for a row between two bodies.  Collective when first read.
 
         Modes of the pinned body are left out: its pieces are glued together and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """Compute a basis (m, z) for the null space of G^T G on active rows.  Collective."""
+        """Compute a basis (m, z) for the null space of G^T G on rows where `active` (owned rows,) is 1.  Collective."""
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:

@@ -175,9 +175,9 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Select global `rows` (k,) without columns, and active rows without columns near them.  Collective.
+        """Select the global `rows` (k,), and active rows nearby up to a full batch, that lack columns.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  If no row is active, none is added.
+        Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows alone get no neighbours.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0

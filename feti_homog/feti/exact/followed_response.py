@@ -156,7 +156,7 @@ class FollowedResponse:
         return all(self._turn(rows[part], signs[part], gains[part], pivot) for part in parts if len(part))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns, like `follow`, for springs (k,) that gain compliance `more` (k,).  Collective."""
+        """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))

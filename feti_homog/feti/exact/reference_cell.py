@@ -231,8 +231,8 @@ class ReferenceCell:
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
 
-    Only the moved body needs forces.  The inner body moves, unless its forces would lose digits because it is more than
-    STIFF_FIBRES times as stiff as the outer body.
+    Columns then need forces of the moved body alone.  The inner body moves, unless its forces would lose digits because
+    it is more than STIFF_FIBRES times as stiff as the outer body.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
@@ -270,7 +270,7 @@ class BondedInverse(Preconditioner):
     is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective."""
+        """Factor the cell with all bonds intact, from dense operators; raises like `ReferenceCell`.  Collective."""
         self._operators, self._one_sided = operators, one_sided_jumps(operators)
         self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
 

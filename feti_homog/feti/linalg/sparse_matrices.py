@@ -32,7 +32,7 @@ def sum_of_blocks(
 
 
 def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
-    """Add buffered blocks to `total`; a block has rows, entry counts of the rows, columns and values."""
+    """Return `total` plus buffered blocks; a block has rows, entry counts of the rows, columns and values."""
     rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
     m, n = total.shape
     # A product adds faster than a conversion from coordinates, which sorts.

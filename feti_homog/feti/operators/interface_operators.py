@@ -195,7 +195,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in inner bodies: at each node, in every body but the outermost."""
+        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, in the inner body alone."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)

@@ -39,7 +39,7 @@ class ExplicitInterfaceOperator:
         Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
-            LinAlgError, MemoryError: as in `schur_complement`, or S is not positive definite off its kernel.
+            LinAlgError, MemoryError, FetiHomogError: as in `schur_complement`; LinAlgError if S is indefinite, too.
         """
         from feti_homog.feti.linalg import dense_matrices  # sparse operators do not need it
 
@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T (`fixing`), or K_ii if pinned and without boundary; `dofs` (n,) are ascending.
+        """Factor K + rho Rf Rf^T (`Subdomain.fixing`); without kernel and boundary, K_ii.  `dofs` (n,) are ascending.
 
         Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
         """

@@ -105,7 +105,7 @@ def prefer_own_toolkits() -> None:
 def ignore_settings_of_the_folder() -> None:
     """Keep Matplotlib from reading `matplotlibrc` in the current folder and from opening windows.
 
-    Matplotlib reads this file on import, and a damaged file fails.  So, if it exists, import Matplotlib now, from "/".
+    Matplotlib reads this file on import, and fails if it is damaged.  So if it exists, import Matplotlib now, from "/".
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:

@@ -121,7 +121,7 @@ class Progress:
         self._inner_seconds = [0.0]  # times of stages within the open stages, with the innermost open stage last
 
     def say(self, line: str) -> None:
-        """Print one line on rank 0, above a progress bar."""
+        """Print one line on rank 0, above a progress bar; print nothing if `quiet`."""
         if self.on_terminal:
             from tqdm import tqdm
 
