@@ -159,7 +159,7 @@ class MixedElements:
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """Compute the stiffness rows (e, 2n, 14) of n shape functions, with columns for bubble displacements:
+        """Compute the stiffness rows (e, 2n, 14) of n shape functions; the last two columns belong to the bubble:
 
         K_(a i)(b j) = int mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """

@@ -76,7 +76,7 @@ class InfluenceSolutions:
         """Compare solutions by F lambda with the prediction, and renew the quota; `d` as in `solutions`.  Collective.
 
         The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
-        on active rows.  If an error exceeds MOST_FOLLOWED_ERROR and twice the rounding, the answer is computed anew.
+        on active rows.  An error above MOST_FOLLOWED_ERROR and twice the rounding of F lambda renews the answer.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.

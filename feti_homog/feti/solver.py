@@ -185,7 +185,7 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return the loads (v + m, v) of unit strains: E and, with tractions, the Sigma for which E is the mean strain.
+        """Return loads (v, v) of unit strains, or (v + m, v) with tractions Sigma for which E is the mean strain.
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """

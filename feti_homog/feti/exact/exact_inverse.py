@@ -217,7 +217,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Returns None unless `free` pins exist; then a changed cell is factored anew.
+        possible positions.  Unless `free` pins exist, a changed cell is factored anew, and the result is None.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:

@@ -37,8 +37,8 @@ KEPT = "\n\t"  # characters that are printed although they are not printable; ot
 def end_on_signals() -> None:
     """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU, with exit code 128 + signal.
 
-    Before the end, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Signals
-    that are ignored, as in a background job, remain ignored; SIGPIPE is blocked.  Call this before any thread starts.
+    Before the end, rank 0 prints a line and `remarks` on stderr, and lock files and unfinished files are removed.
+    Signals that are ignored, as in a background job, stay ignored; SIGPIPE is blocked.  Call this before threads start.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # SIGPIPE is not needed: a write reports that the reader of a pipe has closed it.
