@@ -150,7 +150,7 @@ def launch(
 
 
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
-    """Start PETSc and run a command on all ranks.
+    """Start PETSc and run a command on all ranks.  Collective.
 
     PETSc takes its options from `argv` (default: of the process) and PETSC_OPTIONS; the command gets the other words.
     Returns the exit code of `run_main`, or the code for missing libraries.

@@ -82,7 +82,7 @@ def assemble(
 
 @lru_cache(maxsize=16)  # pieces of a label image have few different classes
 def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
-    """Return a matrix (blocks, t p) that sums couples to blocks of K, the block columns, and each row's first block.
+    """Find the pattern of K: sums (blocks, t p) of couples to blocks, the block columns, and each row's first block.
 
     `classes` holds the bytes of the node classes (t, q) of all coarse triangles; K has (n, n) blocks.
     """
@@ -253,7 +253,7 @@ def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """Return the nodes (sides, intervals + 1) along the torus edges in a mask, ordered with the body on the left."""
+    """Return the nodes (sides, intervals + 1) along the torus edges in a mask; the body is on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """The n pairs of a boundary vertex, which has few elements, and a neighbour, which has the weight NEIGHBOURS.
+    """The n pairs of a boundary vertex, with few elements, and a neighbour; the neighbour has the weight NEIGHBOURS.
 
     Attributes:
         at, other: (n,) boundary vertex and neighbour vertex.

@@ -159,7 +159,7 @@ class AdaptiveCoarseSpace:
         return forces
 
     def solve(self, work: Float) -> Float:
-        """Solve Z_0^T S Z_0 c = w for c (u, k), with w the sum of `work` (u, k) over ranks.  Collective."""
+        """Solve Z_0^T S Z_0 c = w for c (u, k); w is the sum of `work` (u, k) over ranks.  Collective."""
         with self._solve_event:
             right = distributed_arrays.scale_rows(self._weights, work)
             return distributed_arrays.scale_rows(self._weights, self.solver.solve(right))

@@ -146,7 +146,7 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """Compute the forces f = N p (n, m), N = B^T M B, projected so that R^T f = 0.
+    """Compute the forces f = N p (n, m), N = B^T M B, and project them to R^T f = 0.
 
     S+ N p is a step of inverse iteration, which turns an eigenvector p (n, m) of the trace space into a displacement of
     the body itself.  `R` (n, k) is the kernel.  The result has the precision of M.

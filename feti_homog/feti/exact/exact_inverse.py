@@ -26,7 +26,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
-    """The preconditioner z = H r, with the inverse H of the projected dual operator on the active rows.
+    """The preconditioner z = H r; H is the inverse of the projected dual operator on the active rows.
 
     Attributes:
         neighbours: adjacent interface nodes.
@@ -148,7 +148,7 @@ class ExactInverse(Preconditioner):
         return self._changes()
 
     def _add_columns(self, rows: Int) -> None:
-        """Compute missing columns of the present response, at global rows (k,) and pins.  Collective."""
+        """Follow missing columns at global rows (k,) and pins; factor the cell anew if digits are lost.  Collective."""
         rows = np.union1d(rows, self._followed.pins)
         if not len(self._followed.lacking(rows)):
             return
@@ -175,7 +175,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Select the global `rows` (k,), and active rows nearby up to a full batch, that lack columns.  Collective.
+        """Select rows without columns: the global `rows` (k,), and active rows nearby up to a full batch.  Collective.
 
         Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows alone get no neighbours.
         """
@@ -200,7 +200,7 @@ class ExactInverse(Preconditioner):
         return self._rounding
 
     def apply(self, r: Float) -> Float:
-        """Compute H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
+        """Compute H r for r (owned rows,) or (owned rows, k), 0 on inactive rows; may factor the cell.  Collective."""
         z = self._up_to_date().refined(self._of_reference(r if r.ndim == 2 else r[:, None]))
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 

@@ -86,7 +86,7 @@ class ShiftedFactor:
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """Compute u (dofs, k) with K u = f (dofs, k) from its values x (n, k) on `rows`, by (K + D) u = f + D x."""
+        """Solve K u = f (dofs, k) for u (dofs, k), by (K + D) u = f + D x; x (n, k) are the values of u on `rows`."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)

@@ -209,7 +209,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Return a PETSc matrix on this rank that shares the arrays of `matrix`, whose indices are sorted in place."""
+    """Share the arrays of `matrix` with a PETSc matrix on this rank; the indices are first sorted in place."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

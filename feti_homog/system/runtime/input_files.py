@@ -61,7 +61,7 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 
 
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
-    """Return function(path), which is picklable and computed in a child process with at most `memory` further bytes.
+    """Compute function(path), a picklable result, in a child process with at most `memory` further bytes.
 
     The child ends with this process, or after `seconds` of CPU time (None: by file size), or after 30 `seconds` by the
     clock.

@@ -35,7 +35,7 @@ KEPT = "\n\t"  # characters that are printed although they are not printable; ot
 
 
 def end_on_signals() -> None:
-    """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU, with exit code 128 + signal.
+    """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU; the exit code is 128 + signal.
 
     Before the end, rank 0 prints a line and `remarks` on stderr, and lock files and unfinished files are removed.
     Signals that are ignored, as in a background job, stay ignored; SIGPIPE is blocked.  Call this before threads start.
