@@ -52,7 +52,7 @@ def assemble(
     Quadratic elements with isotropic stiffness in the plane may be mixed: with bubble and pressure (`MixedElements`).
 
     Args:
-        laws: stiffness L (v, v), or (materials, v, v) with the `material` (t,) of every coarse triangle.
+        laws: stiffness L (v, v) or (materials, v, v); several need the `material` (t,) of every coarse triangle.
         mixed: whether the elements are mixed, for all materials or material by material.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components

@@ -73,7 +73,7 @@ class InfluenceSolutions:
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Compare solutions by F lambda with the prediction, and renew the quota; `d` as in `solutions`.  Collective.
+        """Compare solutions by F lambda with predictions, and renew the quota; `d` is as in `solutions`.  Collective.
 
         The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
         on active rows.  An error above MOST_FOLLOWED_ERROR and twice the rounding of F lambda renews the answer.

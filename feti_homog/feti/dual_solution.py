@@ -157,7 +157,7 @@ def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
     For u = K+ f (boundary dofs, v) and the machine precision eps, the estimate is B K+ (eps diag(K) |u|) with random
-    signs: jumps under forces as large as the rounding of K u.  Under them, soft subdomains between stiff ones move far.
+    signs: jumps under forces as large as the rounding of K u.  Such forces move soft subdomains between stiff ones far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

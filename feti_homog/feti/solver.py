@@ -261,14 +261,14 @@ class FetiSolver:
         return solution if solution.alpha is not None else self.jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute the boundary displacements u* (boundary dofs,), Eq. (34); see `completed`.  Collective."""
+        """Complete a solution, and compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.R @ solution.alpha[self.natural.owned_modes])
 
     def displacement(self, solution: DualSolution) -> Float:
-        """Compute the displacements u* (local dofs,), Eq. (34).  Collective; the first call may factor interiors."""
+        """Complete a solution, and compute u* (local dofs,), Eq. (34); may factor interiors.  Collective."""
         u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
         return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 

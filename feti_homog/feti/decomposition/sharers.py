@@ -56,7 +56,7 @@ class Sharers:
 
 
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
-    """Encode keys (n,) of vertex classes or torus edges as unique codes (n,), odd for edges."""
+    """Encode keys of vertex classes or torus edges as unique codes in an array of equal shape, odd for edges."""
     return np.asarray(2 * key + is_edge)
 
 

@@ -19,7 +19,7 @@ class Subdomain:
     """One subdomain: a piece of a body, or of several bonded bodies.
 
     It has n node classes with c displacements each, and a kernel of dimension k.  K takes by far the most memory:
-    `build` assembles K, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
+    `build` assembles K, the first `take_stiffness` hands K over to the caller, and later calls assemble K anew.
 
     Attributes:
         submesh: coarse mesh.

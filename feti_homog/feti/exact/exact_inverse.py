@@ -136,7 +136,7 @@ class ExactInverse(Preconditioner):
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Collect the changed rows, after a new reference cell if there are too many.  Collective."""
+        """Collect the changed rows; if there are too many, first factor a new reference cell.  Collective."""
         changes = self._changes()
         if len(changes.rows) - self._tie_count <= self._max_changes:
             return changes
@@ -229,7 +229,7 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Store and return the answer U (owned rows, v) by the response of the reference cell to `d`.  Collective.
+        """Compute U (owned rows, v) anew from the reference cell's response to `d`; store and return U.  Collective.
 
         `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
         rounding from earlier updates.

@@ -126,7 +126,7 @@ def _even_share(comm: MPI.Intracomm, n: int) -> int:
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Sum local matrices into a distributed PETSc matrix; arguments as in `assemble_owned_rows`.  Collective."""
+    """Sum local matrices into a distributed PETSc matrix; arguments are as in `assemble_owned_rows`.  Collective."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)

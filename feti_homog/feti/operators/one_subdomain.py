@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T (`Subdomain.fixing`); without kernel and boundary, K_ii.  `dofs` (n,) are ascending.
+        """Factor K + rho Rf Rf^T (`Subdomain.fixing`), or K_ii of held subdomains without boundary; `dofs` (n,) ascend.
 
         Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
         """
