@@ -165,7 +165,7 @@ class KnownTractions:
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Copy the stresses (vertices, m, k), and match the known tractions at vertices `vertex` (n,).
+        """Copy `stress` (vertices, m, k), and match the known tractions at the vertices `vertex` (n,).
 
         With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
         where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.

@@ -201,7 +201,7 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for one load (v,) from `start` (owned rows,), like `solve_many`.  Collective."""
+        """Solve the dual problem for a load `strain` (v,) from `start` (owned rows,) by `solve_many`.  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:

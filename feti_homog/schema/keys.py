@@ -136,7 +136,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Every fault, also in a nested table, adds a line to `faults`; `prefix` precedes the key name in this line.
+        Every fault, also in a nested table, adds a line to `faults`, which names `section`, `prefix` and key.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")

@@ -185,7 +185,7 @@ class GramMatrix:
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
         """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        An eigenvalue of a group counts as zero up to the largest `tolerance` (m,) of its modes.
+        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) are 0.
         """
         padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]

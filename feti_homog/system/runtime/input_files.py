@@ -40,7 +40,7 @@ def opened(path: Path, pipes: bool = False) -> BinaryIO:
 
 
 def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
-    """Return the content of a file; see `opened`.
+    """Return the content of a file; `pipes` is as in `opened`.
 
     Raises:
         OSError: as in `opened`, and if a file has more than `most` bytes.

@@ -134,7 +134,7 @@ class Progress:
     def stage(self, name: str) -> Iterator[list[str]]:
         """Context manager: time a block as a stage of the run and of PETSc's log; print its time unless it raises.
 
-        The block may append remarks to the yielded list, which are printed with the time.  Inner stages are excluded.
+        The block may append remarks to the yielded list, which are printed with the time.  Inner stages do not count.
         """
         from petsc4py import PETSc
 
