@@ -197,7 +197,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute the fields in elements, mixed if `is_mixed`, from nodes and u (e, a, 2), and the stiffness L (3, 3)."""
+    """Compute the fields in elements, mixed if `is_mixed`, from nodes `points` and u (e, a, 2), and L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))

@@ -169,11 +169,11 @@ def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the soft eigenvectors q (m, j): P^T S P q = theta P^T N P q with theta < `threshold`.
+    """Compute the soft eigenvectors q (m, j): P^T S_s P q = theta P^T N_s P q with theta < `threshold`.
 
     Args:
-        S: (m, m) P^T S P for the trace space P (n, m), regularised on the kernel of S.
-        N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
+        S: (m, m) P^T S_s P for the trace space P (n, m), regularised on the kernel R (n, k) of S_s.
+        N: (m + k, m + k) [P R]^T N_s [P R].
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]

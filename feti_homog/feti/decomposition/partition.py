@@ -121,7 +121,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) for `load` (b,) triangles, `dofs_per_load` each; pieces have up to about `max_dofs`."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles; pieces have about `max_dofs` dofs or fewer."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 

@@ -190,7 +190,7 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K where it scales jumps.
+        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K that scales jumps.
 
         Single nodes of mixed elements are as stiff as lambda, boundary motions at constant volume only as mu.  The
         factor is 1 without mixed elements, and for several materials, which are all far from incompressible.  lambda
