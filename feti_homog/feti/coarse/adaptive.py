@@ -5,8 +5,8 @@ Eliminating the coarse displacements Z_0 (`geneo.AveragedModes`) turns the bound
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
 and the preconditioner is H_0 = B_D S_0 B_D^T, B_D = W^-1 B D^-1 (`preconditioners`).  As B Z_0 = 0, H_0 inverts the
-dual operator if Z_0 spans all displacements of the glued cell (T9 in THEORY.md), and removes the soft modes that Z_0
-spans from the Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is semi-definite, and couples neighbours.
+dual operator if Z_0 spans all displacements of the glued cell (THEORY.md, T9), and keeps the soft modes in Z_0 out of
+the Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is semi-definite; it couples up to second neighbours.
 """
 
 from __future__ import annotations
