@@ -46,7 +46,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """Return `SharedEntities.pair` (n,) of all shared entities; `pairs` is as in `share_entities`.
 
-    It is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
+    The pair is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]

@@ -85,7 +85,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow columns to the state `active`, `more` (owned rows,), like `FollowedResponse.follow`.  Collective."""
+        """Follow columns to the rows `active` with compliance `more`, like `FollowedResponse.follow`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)

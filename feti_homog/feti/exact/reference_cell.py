@@ -204,7 +204,7 @@ class ReferenceCell:
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
     def _without_springs(self, x: Float) -> Float:
-        """Compute Gamma x without the springs at nodes of A where both bodies are cut.  Collective.
+        """Compute Gamma x without the springs C at nodes of A where both bodies are cut.  Collective.
 
         With x = (g, f): u = B_D^T g + Z y, Z^T (S u - B_I^T f) = 0, B_A^T lam = S u - B_I^T f, gap = -B_I u - C_I f.
         """
