@@ -163,10 +163,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct the preconditioner that `name` selects, as in `SolverPlan`.  Collective.
-
-    The modules of `feti.exact` are imported only where a preconditioner needs them.
-    """
+    """Construct the preconditioner `name`, as in `SolverPlan`; import `feti.exact` only if needed.  Collective."""
     if name == "influence":
         from feti_homog.feti.exact.exact_inverse import ExactInverse
 
@@ -183,7 +180,7 @@ class SolverParts:
     """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
-        operators, preconditioner, natural: boundary operators; M^-1 or H_0; rigid-body motions, G and P.
+        operators, preconditioner, natural: boundary operators; M^-1, H_0 or H; rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         method: names of preconditioner and coarse space for the summary.

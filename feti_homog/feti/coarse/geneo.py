@@ -99,7 +99,7 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1, at `Neighbours.rows`.  Collective."""
+    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1; `rows` are `Neighbours.rows`.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):

@@ -146,7 +146,7 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """Compute the forces N p (n, m), N = B^T M B, projected so that R^T N p = 0.
+    """Compute the forces f = N p (n, m), N = B^T M B, and project them to R^T f = 0.
 
     S+ N p is a step of inverse iteration, which turns an eigenvector p (n, m) of the trace space into a displacement of
     the body itself.  `R` (n, k) is the kernel.  The result has the precision of M.
@@ -169,11 +169,11 @@ def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the soft eigenvectors q (m, j): P^T S P q = theta P^T N P q with theta < `threshold`.
+    """Compute the soft eigenvectors q (m, j): P^T S_s P q = theta P^T N_s P q with theta < `threshold`.
 
     Args:
-        S: (m, m) P^T S P for the trace space P (n, m), regularised on the kernel of S.
-        N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
+        S: (m, m) P^T S_s P for the trace space P (n, m), regularised on the kernel R (n, k) of S_s.
+        N: (m + k, m + k) [P R]^T N_s [P R].
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]

@@ -19,7 +19,7 @@ class Subdomain:
     """One subdomain: a piece of a body, or of several bonded bodies.
 
     It has n node classes with c displacements each, and a kernel of dimension k.  K takes by far the most memory:
-    `build` assembles K, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
+    `build` assembles K, the first `take_stiffness` hands K over to the caller, and later calls assemble K anew.
 
     Attributes:
         submesh: coarse mesh.
@@ -148,7 +148,7 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L (v + m, v + m), padded with 0 for the m tractions on sides."""
+        """Return |Omega| L (v, v), with tractions on the sides padded by 0 to (v + m, v + m)."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C
@@ -167,8 +167,8 @@ class Subdomain:
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
-        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to its stiffness, perhaps far above all forces.  Else, the result is `answers`.
+        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion; else
+        the result is `answers`.  Rounding in K+ Q, times the stiffness of the body, may far exceed all forces.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -190,7 +190,7 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K where it scales jumps.
+        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K that scales jumps.
 
         Single nodes of mixed elements are as stiff as lambda, boundary motions at constant volume only as mu.  The
         factor is 1 without mixed elements, and for several materials, which are all far from incompressible.  lambda

@@ -32,7 +32,7 @@ def sum_of_blocks(
 
 
 def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
-    """Add buffered blocks to `total`; a block has rows, entry counts of the rows, columns and values."""
+    """Return `total` plus buffered blocks; a block has rows, entry counts of the rows, columns and values."""
     rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
     m, n = total.shape
     # A product adds faster than a conversion from coordinates, which sorts.
@@ -126,7 +126,7 @@ def _even_share(comm: MPI.Intracomm, n: int) -> int:
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Sum local matrices into a distributed PETSc matrix; arguments as in `assemble_owned_rows`.  Collective."""
+    """Sum local matrices into a distributed PETSc matrix; arguments are as in `assemble_owned_rows`.  Collective."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)

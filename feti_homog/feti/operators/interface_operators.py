@@ -115,8 +115,7 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) first boundary dof of every subdomain, and n.
         local_dofs: (n,) numbers of the boundary dofs among all dofs of this rank.
         operators: for every subdomain, S and S+ as dense matrices or by sparse factors.
-        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioner and coarse
-            space.
+        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioners.
         facewise: for every subdomain, whether soft modes are computed face by face.
         B, BT: (local rows, n) constraints, and their transpose.
         body_diagonal: (n,) diagonal of K.
@@ -195,7 +194,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in inner bodies: at each node, in every body but the outermost."""
+        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, in the inner body alone."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -233,7 +232,7 @@ class InterfaceOperators:
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C (v, v) and energies."""
+        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C and of energies, (v, v)."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])

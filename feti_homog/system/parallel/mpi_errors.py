@@ -149,7 +149,7 @@ def _lines(error: FetiHomogError) -> str:
 
 
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
-    """Call a function; return its result and None, or None and its exception, a FetiHomogError if a file failed."""
+    """Call a function; return (result, None) or (None, exception); OSError with a file name becomes FetiHomogError."""
     try:
         return function(*args, **kwargs), None
     except OSError as error:

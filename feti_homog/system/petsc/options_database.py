@@ -96,7 +96,7 @@ NO_SUCH_METHOD = "requested KSP type"
 
 
 class _Identity:
-    """The identity as a 1 x 1 shell matrix and shell preconditioner, like the dual problem."""
+    """The identity as a 1 x 1 shell matrix and shell preconditioner, in place of the dual problem."""
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)
