@@ -103,11 +103,7 @@ class UnmeshedCell:
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations) -> NodedCell:
-        """Put nodes on all lines of the cell, and cut the cell into tiles.
-
-        Raises:
-            MeshError: the lines would have too many nodes.
-        """
+        """Put nodes on all lines of the cell, and cut the cell into tiles.  Raises MeshError for too many nodes."""
         lines = self.bare.outline(stations)
         arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
         classes = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)

@@ -54,7 +54,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List pixels that voids cut off from others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
+    """List faults: pixels that voids cut off, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:

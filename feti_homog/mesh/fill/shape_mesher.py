@@ -36,11 +36,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.
-
-    Raises:
-        MeshError: the mesh would have too many elements.
-    """
+    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.  MeshError for too many elements."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
@@ -146,9 +142,9 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
-    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle of curvature at corners and on ellipses,
-    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
-    side that the outline faces; it is at least LEAST cell sizes.
+    h_k is at most the interface size, 2 pi R / MIN_EDGES_AROUND with the radius of curvature R at rounded corners and
+    on ellipses, COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or
+    to a cell side that the outline faces; it is at least LEAST cell sizes.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

@@ -56,10 +56,11 @@ def coating_size(arrangement: Arrangement) -> Float:
 
 
 def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: Sequence[Float | float]) -> list[Source]:
-    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps` (k,).
+    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps`.
 
-    The edge length is PASSAGE_EDGE times the passage width, or less if the edges on the other face are shorter. The
-    length grows more slowly than twice the width w + c s^2 / 2 at the distance s along a passage of curvature c.
+    `width` and `curvature` are (k,); `caps` has a limit for each face, () or (k,). The edge length is PASSAGE_EDGE
+    times the passage width, or less if the edges on the other face are shorter. The length grows more slowly than twice
+    the width w + c s^2 / 2 at the distance s along a passage of curvature c.
     """
     growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))
     sources = []
@@ -71,7 +72,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return vertices (v, 2) as sources, with the distance to the next vertex on the torus as length."""
+    """Return distinct `vertices` (v, 2) as sources; the length is the distance to the next vertex on the torus."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -157,13 +158,13 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """Return the edge size on the torus, from passages, vertices, discs and tips.
+    """Return the field of edge sizes on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
     of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
-    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. The size
-    is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one of the
-    `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
+    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. Graded
+    sizes are at most h_i + g d at the distance d from disc i, with h_i from `MeshSizes.on_circles`, and h_t + g max(0,
+    d - h_t) at the distance d from one of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)

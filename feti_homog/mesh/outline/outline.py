@@ -25,7 +25,7 @@ Marks = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Bridges:
-    """Straight lines between discs `ends` (b, 2), in the directions `angle` (b,), in radians, from the first."""
+    """Straight lines between circles `ends` (b, 2); `angle` (b,) is the direction from the first circle, in radians."""
 
     ends: Int
     angle: Float
@@ -84,7 +84,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the coordinates (k,) of corners and curves on the side through 0 along `axis`, in ascending order."""
+    """Return the ascending coordinates (k,) of corners and crossings with curves on the side through 0 along `axis`."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])

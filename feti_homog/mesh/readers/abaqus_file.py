@@ -62,7 +62,7 @@ class _Content:
         nodes: coordinates by node number.
         triangles, lines: nodes by element number; triangles include quadrilaterals.
         sets: elements by kind and name of the set.
-        materials: materials of the sections, by set name.
+        materials: materials of the sections by set name; the set name itself for sections without a material.
         seen: PART and INSTANCE, if the file has them.
         is_assembly: whether the next block belongs to the assembly itself, and not to a part or an instance.
     """
@@ -129,7 +129,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Add the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
+        """Add numbers, sets or ranges (GENERATE, by default step 1) to a set; ValueError if faulty or over `budget`."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (

@@ -185,7 +185,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phases that select its name or, if none does, one of its aliases.
+    """Rename each group to the phases that select its name or number or, if none does, one of its aliases.
 
     Other groups keep their names. The entry `debonded` selects curves.
 

@@ -79,7 +79,8 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
-    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces within NEARLY_ROUND.
+    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces, without middle nodes,
+    within NEARLY_ROUND.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -210,8 +211,8 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse, or beyond the
-    tolerance of the chain as in `_distance`.
+    The conic d.A.d + b.d = 1 of least squares, with d from the mean, is |F^-1 (d - c)| = 1 for the centre c and the
+    frame F.  Returns None if it is no ellipse, or if `_distance` from the chain exceeds the tolerance.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -230,7 +231,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
 
 
 def _distance(ellipse: Ellipses, chain: Float) -> float:
-    """Return the distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps over 60 degrees."""
+    """Return the largest distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps > 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

@@ -118,10 +118,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
-    """Cut a cell with the outline `lines` into tiles.
-
-    Without a tiling, the cell is one tile.
-    """
+    """Cut a cell with the outline `lines` into tiles.  Without a tiling, the cell is one tile."""
     if tiles is None:
         return [cell]
     from feti_homog.mesh.tiles import matrix_faces
