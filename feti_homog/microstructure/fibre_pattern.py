@@ -55,7 +55,8 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        For a window the value is unbiased: these discs outside and other discs inside have equal areas on average.
+        For a window the value is unbiased: the parts of these discs outside, and of other discs inside, are equal on
+        average.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 

@@ -151,11 +151,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Build a table from a list of fibres {column: value}; messages number the rows from 1.
-
-    Raises:
-        CaseError: the list is faulty; one line per fault.
-    """
+    """Build a table from fibres {column: value}; rows are numbered from 1.  Raises CaseError, one line per fault."""
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):
         for key in entry.keys() - set(COLUMNS):
@@ -183,7 +179,7 @@ class _Faults:
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add repeated, misspelt and missing column names to the faults; CaseError without any known name."""
+    """Add repeated, misspelt and missing column names and mixed units to the faults; CaseError without known names."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))

@@ -81,7 +81,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return (f - `by_chance`) sqrt(L) (k,), for f <= 1 edges per pixel on L visible rim pixels; 0 for hidden rims."""
+    """Return (f - `by_chance`) sqrt(L) (k,) for f <= 1 edges per pixel on L visible rim pixels; 0 for hidden rims."""
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)

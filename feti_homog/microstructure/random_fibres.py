@@ -179,9 +179,10 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2; success is at least
-    1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
-    reductions over the discs, so that every machine gets the same numbers.
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2. Without success in
+    `max_steps` steps, the clearance is below 1 and belongs to the centres before the last step. The heavy-ball descent
+    x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no reductions over the discs, so
+    that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -222,6 +223,6 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, of N discs in a periodic cell from a measured window."""
+    """Return the `match_distance`, in mean diameters, between a measured window and N discs in a periodic cell."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

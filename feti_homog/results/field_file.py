@@ -47,8 +47,8 @@ class FieldFile:
 
     `field_layout` lists tables, attributes and views of tables.  An array without rows has shape (0, ...).
 
-    Until `close` the file has the name `part`. A `with` block closes the file at its end. An error that all ranks raise
-    removes the file; any other exception leaves the file unfinished.
+    Until `close` the file has the name `part`. A `with` block closes the file at its end. A FetiHomogError on all ranks
+    removes the file; any other exception in the block leaves the file unfinished.
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.

@@ -34,7 +34,7 @@ def header(cell: unit_cell.TornCell) -> Header:
 
 
 def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
-    """Concatenate the refined meshes of this rank's subdomains."""
+    """Concatenate the refined meshes of this rank's subdomains; nodes are numbered from 0 on each rank."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order

@@ -118,7 +118,7 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
 
 
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
-    """Return a line for each phase that passes its strength before the peak.
+    """Return a line for each phase that passes its strength up to the peak.
 
     The lines give stress and strain.  Utilisations at the kept points `numbers` are interpolated linearly, from 0 on.
     """

@@ -66,7 +66,8 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder or a broken link has the name of a result file, or a foreign file has such a name.
+        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder cannot be
+            read.
     """
     if not directory.is_dir():
         return
@@ -228,7 +229,10 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank."""
+    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank.
+
+    Raises FetiHomogError if the event folder stays.
+    """
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 

@@ -51,9 +51,9 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
     """Read a cell state from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length).  `elements` has element
-    means: the tensors stress and strain; S11, S22, S12, S33, von_mises, and principal_1 to principal_3, largest first
-    (stress); body, fibre_number, phase and subdomain.  Strains include thermal strains.  A value is NaN if the material
-    constants do not determine it.
+    means: the tensors stress and strain; S11, S22, S12, S33, in space S23 and S13, von_mises, and principal_1 to
+    principal_3, largest first (stress); body, fibre_number, phase, subdomain and mesh_error.  Strains include thermal
+    strains.  A value is NaN if the material constants do not determine it, mesh_error if the run did not estimate it.
 
     Raises:
         CaseError: result.h5 is missing or damaged, or has no such state.

@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs.  The area is A + P r + pi r^2 (Steiner; core area A, perimeter P)."""
+        """The radii (k,) of discs with the area A + P r + pi r^2 (Steiner); core area A, perimeter P, r^2 = |det F|."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) to the nearest of POINTS or more outline points at vectors (n, k, 2) from centres."""
+        """Return distances (n, k) of points, `offsets` (n, k, 2) from the centres, to POINTS or more outline points."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
@@ -98,7 +98,8 @@ class ConvexSums(ConvexCurves):
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
         """Return q points along all outlines (q, 2), unit normals (q, 2), and outline numbers (q,).
 
-        Normals have `count` equidistant directions; points of straight sides are at most 1 / count outlines apart.
+        Normals have `count` equidistant directions; points on straight sides are at most 1 / count of the perimeter
+        apart.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
         points = self.facing(np.broadcast_to(normal, (len(self), count, 2)))
