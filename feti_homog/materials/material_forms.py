@@ -89,7 +89,8 @@ class Isotropic:
 class Orthotropic:
     """Engineering constants along the material axes 1, 2 and 3 = x3; nu_ij = -eps_j/eps_i under stress along i.
 
-    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12, plane strain also E3, nu13, nu23, generalized all.
+    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12; plane strain also E3, nu13, nu23; generalized plane
+    strain all constants.
     """
 
     E1: float = stress("Young's modulus along axis 1.")

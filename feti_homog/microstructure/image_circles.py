@@ -35,7 +35,7 @@ def round_fibres(image: Float) -> Float:
 
 
 def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, Float]:
-    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` pixels.
+    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` (columns, rows).
 
     Returns the fraction of the edges that lie on circles, and the circles (k, 3).
     """

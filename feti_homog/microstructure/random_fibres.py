@@ -37,7 +37,7 @@ class NearestNeighbours:
         weights: (N, k), weights of the distances in their distribution; each column sums to 1.  In a periodic cell
             weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
             that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]
-            compensates that fewer long distances count.  A column is zero if none of its distances counts.
+            compensates for the loss of long distances.  A column is zero if none of its distances counts.
     """
 
     distances: Float
@@ -120,8 +120,9 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
     """Move the fibres of a periodic pattern to reduce `match_distance` to the target `wanted`.
 
     A trial move takes a random fibre to a random position around its centre, near or far. The move is accepted if the
-    fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. Sums have a
-    fixed order of terms, so that every machine takes the same moves. Returns the centres (N, 2), N at least 3.
+    fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. The search ends
+    when this distance is below CLOSE, or after MOVES_OF_A_FIBRE moves per fibre, at most MOST_MOVES. Sums have a fixed
+    order of terms, so that every machine takes the same moves. Returns the centres (N, 2), N at least 3.
     """
     count, size = pattern.count, pattern.size
     centres, target = pattern.wrapped.copy(), wanted * (2 * pattern.mean_radius)

@@ -138,7 +138,7 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Write the tables of a group; each rank writes its own rows."""
+        """Write the tables of a group; each rank writes its own rows.  Raises ValueError for a wrong number of rows."""
         size = self._bytes(part)
         self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size

@@ -50,7 +50,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     than `LEAST_FALL`, and all falls of an unfinished path, count only after the largest stress.  The entry `so_far`
     marks a path that is unfinished, or stopped early without a fall.
 
-    On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
+    On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
     points, component = path_curves.leading_points(document), path_curves.leading_component(document)
     before = len(path_curves.leading_points(document, ("broke", "softened")))

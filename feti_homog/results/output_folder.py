@@ -40,7 +40,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that a run can use the folder `directory`, and create nothing.
+    """Check that a run can use the folder `directory`; nothing is created.
 
     The folder, or the folder in which it will lie, must be writable, and no other run may use it.  Raises CaseError.
     """
@@ -91,7 +91,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about an unreadable or another case's result that a run replaces, or "".  Call on one rank.
+    """Return a warning if a run replaces an unreadable result or another case's; else "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -231,7 +231,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
     """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank.
 
-    Raises FetiHomogError if the event folder stays.
+    Raises FetiHomogError if the checkpoint folder cannot be removed.
     """
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints

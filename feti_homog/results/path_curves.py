@@ -152,9 +152,9 @@ def scales_with_toughness(document: Document) -> bool:
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return the corners (v, 2 c) of a proportional path under a rising load, stresses first.
 
-    Where bonds break at a load t, all bonds that cannot carry t without them also break.  The cell then follows the
-    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t', and
-    the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    Where bonds break at a load t, all bonds that cannot carry t without these bonds also break.  The cell then follows
+    the next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
+    and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])

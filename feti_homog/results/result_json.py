@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write` for values."""
+    """Return the text of a document, with its checksum, for `loads`.  Values and their errors are as in `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -120,8 +120,8 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
     """Write a CSV table with a row for each record, and return the path.  Call on one rank.
 
-    The records have one class.  Columns are numbers, strings and array components, without empty columns, other arrays
-    and nested records.  Raises FetiHomogError if the table cannot be written.
+    The records have one class.  Columns are numbers, strings and array components; empty columns, other arrays and
+    nested records are left out.  Raises FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []

@@ -71,8 +71,9 @@ class ElementEstimate:
     def triangles(self) -> float:
         """The estimated triangle count in a cell without debonded arcs.
 
-        Triangles of one size fill the cell. More lie around fibres, at the ends of ellipses, and on both sides of
-        interfaces of length P, size h, growth g and A = TRIANGLE_AREA: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).
+        Triangles of one size fill the cell. Further triangles lie around fibres, at the ends of ellipses and, with
+        `interface_size` h, on both sides of interfaces of length P: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h), with
+        the growth g = MAX_GROWTH and A = TRIANGLE_AREA.
         """
         cell = self.cell
         irregular = 0 if cell.geometry in cell_section.LATTICES else self.fibres

@@ -84,7 +84,7 @@ def at_vertices(vertices: Float, size: Float) -> Source:
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """The largest edge lengths of a mesh, in descending order.
+    """The largest edge lengths of a mesh / cell width, in descending order.
 
     Attributes:
         largest: length anywhere.
@@ -119,7 +119,7 @@ class MeshSizes:
 class SizeField:
     """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a smaller graded size.
 
-    Source k acts within the distance `largest` / MAX_GROWTH.
+    Source k acts within the distance `largest` / MAX_GROWTH, where it is among the `nearest` sources.
 
     Attributes:
         largest: largest size.
@@ -136,7 +136,7 @@ class SizeField:
         nearest: int = NEAREST,
         chunk: int = CHUNK,
     ) -> None:
-        """Prepare sources on a torus with periods `size` (2,); `nearest` of them count at each of `chunk` points."""
+        """Prepare sources on a torus of `size` (2,): `nearest` act at a point, and a query has `chunk` points."""
         self.largest, self.graded = largest, graded
         self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
@@ -163,8 +163,9 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
     of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
     with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. Graded
-    sizes are at most h_i + g d at the distance d from disc i, with h_i from `MeshSizes.on_circles`, and h_t + g max(0,
-    d - h_t) at the distance d from one of the `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
+    sizes are at most h_i + g d_i at the distance d_i from disc i, with h_i from `MeshSizes.on_circles`, and h_t + g
+    max(0, d_t - h_t) at the distance d_t from one of the `tips` (t, 2), where edges have the size h_t; the growth g is
+    MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
@@ -208,7 +209,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 
 class FromLines:
-    """The size that grows from lines and tips: min(h_i + g d, h_t + g max(0, d - h_t)), see `size_field`.
+    """The size min(h_i + g d_i, h_t + g max(0, d_t - h_t)) at the distances d_i from lines and d_t from tips.
 
     Attributes:
         least: lower bound of the sizes.
@@ -219,7 +220,7 @@ class FromLines:
     ) -> None:
         """Prepare `points` (s, 2) on lines with lengths h_i (s,), and `tips` (t, 2) with the length h_t.
 
-        The distance d refers to the circles (s, 3) through the points or, without circles, to the points.
+        The distance d_i refers to the circles (s, 3) through the points or, without circles, to the points.
         """
         self._size, self._lengths, self._tip, self._circles = size, lengths, tip, circles
         self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))

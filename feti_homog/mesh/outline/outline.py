@@ -44,7 +44,7 @@ class Outline:
         points: (n, 2) exact positions of the nodes on all lines.
         curves: curves through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
-        disc: (k,) disc or ellipse of each image.
+        disc: (k,) index of the fibre of each circle or ellipse.
         around: (k,) the circle that surrounds each circle; MATRIX for a circle in the matrix.
     """
 

@@ -152,7 +152,8 @@ def _closed_loops(
 
     Yields:
         Node classes (k,) in order, unwrapped positions (k, 2) of the classes, unwrapped positions of corner and middle
-        nodes in order, and for each image in the plane the distance (2,) and the numbers of the interface edges.
+            nodes in order, and for each image in the plane its distance (2,) to the unwrapped positions and its
+            interface edges.
     """
     if len(pairs) == 0:
         return
