@@ -95,8 +95,8 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
     The table has Cij of the upper triangle without COUPLINGS, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with
     S = C^-1; in space also the constants of `about_fibres` and, from the stress `heat` (6,) under a unit temperature,
-    normal thermal stresses, normal free strains -S heat and their mean across.  Raises numpy.linalg.LinAlgError if C is
-    singular.
+    normal thermal stresses, free normal strains -S heat and their mean across the fibres.  Raises
+    numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]

@@ -166,9 +166,9 @@ def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     """Return the shear modulus m* of the medium whose energy a coated fibre does not change.
 
     Under shear across the fibre, the displacement u = u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi)
-    of Muskhelishvili's potentials phi and psi have two harmonics on a circle of radius r: exp(-i t), with index 1, and
-    exp(3 i t), with index 3.  As the coated fibre stores the energy of the medium that it replaces, phi has no term 1/z
-    in the medium, and so 2 m* u = -F (Eshelby).  In the matrix with moduli m and k, P = F + 2 m u and
+    of Muskhelishvili's potentials phi and psi have two harmonics on a circle z = r exp(i t): exp(-i t), with index 1,
+    and exp(3 i t), with index 3.  As the coated fibre stores the energy of the medium that it replaces, phi has no term
+    1/z in the medium, and so 2 m* u = -F (Eshelby).  In the matrix with moduli m and k, P = F + 2 m u and
     kappa_m = 1 + 2 m/k,
 
         P_1 ~ 1/r,  P_3 ~ r^3,  F_1 - (3 P_3 + P_1)/(kappa_m + 1) ~ r,  F_3 - (P_3 - P_1)/(kappa_m + 1) ~ 1/r^3,

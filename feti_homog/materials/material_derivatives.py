@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield derivatives by all given constants, in space also by expansions.  Raises as `stiffness_of`, `expansion`."""
+    """Yield derivatives by given constants, in space also by expansions.  Raises as `stiffness_of` and `expansion`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))

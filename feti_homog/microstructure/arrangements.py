@@ -222,9 +222,8 @@ def _tangents(arrangement: Arrangement) -> Float:
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
     """Find all pairs i <= j of centres and images closer than `reach`.
 
-    A centre and its image form a pair i = j, which occurs from both ends; other pairs of images occur once.  Returns i
-    (k,), j (k,), and the vectors (k, 2) from i to the image of j.  Raises MeshError for more than about MOST_PAIRS
-    pairs.
+    A centre and its image form a pair i = j, which occurs from both ends; other pairs of images occur once.  Returns
+    i (k,), j (k,), and the vectors (k, 2) from i to the image of j.  Raises MeshError beyond about MOST_PAIRS pairs.
     """
     inside = centres % size
     images = inside + STEPS[:, None] * size

@@ -89,7 +89,7 @@ def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chanc
 
 
 def _apart(circles: Float, excess: Float) -> Bool:
-    """Mark circles (k,) by falling `excess` (k,), unless they overlap marked circles by 0.4 of the smaller radius."""
+    """Mark circles (k,) by falling `excess` (k,), unless a marked one overlaps them by 0.4 of the smaller radius."""
     tree, is_apart = cKDTree(circles[:, :2]), np.zeros(len(circles), bool)
     is_covered = np.zeros(len(circles), bool)
     for k in np.argsort(-excess, kind="stable"):

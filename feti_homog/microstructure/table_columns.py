@@ -134,7 +134,7 @@ def _bare(word: str) -> str:
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Recognize `known` columns, also by names in OTHERS, in any case of letters.  Returns columns and unread names."""
+    """Recognize `known` columns, also by names in OTHERS, regardless of case.  Returns columns and unread names."""
     bare = list(map(_bare, words))
     if MATLABS_AXIS in bare:
         # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.

@@ -66,8 +66,7 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder cannot be
-            read.
+        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder is unreadable.
     """
     if not directory.is_dir():
         return

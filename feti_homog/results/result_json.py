@@ -1,7 +1,7 @@
 """Read and write result.json, write points as CSV tables and event logs, and seal files by checksums.
 
-Each file is written completely or not at all.  A checksum in a JSON document, or beside a large file, reveals damage
-and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
+Each file but the event log is written completely or not at all.  A checksum in a JSON document, or beside a large file,
+reveals damage and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
 """
 
 import contextlib

@@ -32,7 +32,7 @@ class ViewedState:
         points: (n, 3) node positions; nodes are torn between subdomains.
         cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
-        means: load_factor, temperature, mean_strain and mean_stress, each a row (1, c), from `xdmf.cell_means`.
+        means: rows (1, c) from `xdmf.cell_means`: load_factor, mean_strain, mean_stress and, in space, temperature.
         label: state label.
     """
 

@@ -163,8 +163,8 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
     of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
     with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. Graded
-    sizes are at most h_i + g d_i at the distance d_i from disc i, with h_i from `MeshSizes.on_circles`, and h_t + g
-    max(0, d_t - h_t) at the distance d_t from one of the `tips` (t, 2), where edges have the size h_t; the growth g is
+    sizes are at most h_i + g d_i at the distance d_i from disc i, with h_i from `MeshSizes.on_circles`, and
+    h_t + g max(0, d_t - h_t) at the distance d_t from one of the `tips` (t, 2), where edges have the size h_t; g is
     MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells

@@ -122,7 +122,8 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
 def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
     """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
-    `name` (k,) has the key of each curve in `marks`. Marks within MERGED of another vertex are left out.
+    `crossing` is the result of `on_curves`, and `name` (k,) has the key of each curve in `marks`. Marks within MERGED
+    of another vertex are left out.
     """
     number, points = crossing
     offset, count = points - curves.centres[number], len(number)

@@ -77,7 +77,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read a block of nodes, elements, sets or sections, skip others; ValueError if it is refused or faulty."""
+        """Read a block of nodes, elements, sets or sections, skip others; ValueError for a refused or faulty block."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:

@@ -81,7 +81,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged or in another format, or has elements that are no triangles, quadrilaterals or
+        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals,
             lines.
     """
     data = input_files.read(path)

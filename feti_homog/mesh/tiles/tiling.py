@@ -62,7 +62,7 @@ class Tiling:
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether an arrangement is large and consists of round discs."""
+    """Return whether an arrangement has at least `policy.least_discs` outlines, all of them discs."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 

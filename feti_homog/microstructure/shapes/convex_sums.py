@@ -98,8 +98,7 @@ class ConvexSums(ConvexCurves):
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
         """Return q points along all outlines (q, 2), unit normals (q, 2), and outline numbers (q,).
 
-        Normals have `count` equidistant directions; points on straight sides are at most 1 / count of the perimeter
-        apart.
+        Normals have `count` equidistant directions; points on straight sides are at most perimeter / count apart.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
         points = self.facing(np.broadcast_to(normal, (len(self), count, 2)))
