@@ -34,7 +34,7 @@ class LawChange:
     Attributes:
         name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
         value: value of the constant.
-        stiffness: dC, (3, 3) or (6, 6).
+        stiffness: dC, (3, 3) or (6, 6); in conduction dk, (3, 3).
         expansion: (6,) d alpha.
     """
 

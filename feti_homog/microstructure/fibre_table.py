@@ -106,9 +106,9 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Read a fibre table from a text file.  Fibres may overlap.
 
     The first line, or `columns`, lists the names: x, y, radius (or a, b), phase, coating, angle and other names that
-    `understood` accepts. A line per fibre follows. Commas, semicolons, tabs or else spaces separate columns; commas may
-    be decimal marks if other characters separate columns. "#" begins a comment; "# width = 120, height = 80" gives the
-    cell size, and "left" and "bottom" give the lower left corner.
+    `understood` accepts. A line of units may follow, then a line per fibre. Commas, semicolons, tabs or else spaces
+    separate columns; commas may be decimal marks if other characters separate columns. "#" begins a comment;
+    "# width = 120, height = 80" gives the cell size, and "left" and "bottom" give the lower left corner.
 
     Raises:
         CaseError: the table is faulty; one line per fault, with the line number in the file.

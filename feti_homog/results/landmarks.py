@@ -183,7 +183,8 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress.
 
     A drop leads from a peak to the next valley.  On the first of `legs` legs (see `kept`), a drop also leads from each
-    load at which bonds break to the next point that a rising load reaches.  A jump leads across all points at one load.
+    load at which bonds break to the next point that a rising load reaches.  Elsewhere, a jump leads across all points
+    at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)

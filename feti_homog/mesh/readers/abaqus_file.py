@@ -129,7 +129,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Add numbers, sets or ranges (GENERATE, by default step 1) to a set; ValueError if faulty or over `budget`."""
+        """Add elements, sets or ranges (GENERATE, default step 1) to a set; ValueError if faulty or over `budget`."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (

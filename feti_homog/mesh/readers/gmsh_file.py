@@ -81,7 +81,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals,
+        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals and
             lines.
     """
     data = input_files.read(path)

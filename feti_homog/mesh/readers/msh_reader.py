@@ -132,10 +132,10 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
-    on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
-    to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
-    beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
+    A side lies at the median of all outer nodes within `tolerance`, relative to the width, of the outermost node. Two
+    nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
+    move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
+    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
