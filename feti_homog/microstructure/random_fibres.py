@@ -224,6 +224,9 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, between a measured window and N discs in a periodic cell."""
+    """Return the `match_distance`, in mean diameters, between a measured window and N discs in a periodic cell.
+
+    Raises ValueError if the window is too small.
+    """
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

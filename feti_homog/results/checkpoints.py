@@ -81,8 +81,7 @@ class EventsInMemory:
             shared: values, equal on all ranks.
             distributed: this rank's parts of distributed arrays.
 
-        Raises:
-            FetiHomogError: a `Checkpoint` cannot write its file.
+        Raises FetiHomogError if a `Checkpoint` cannot write its file.
         """
         event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
         self._bytes -= sum(map(len, self._events[number:]))

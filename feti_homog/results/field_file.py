@@ -52,6 +52,7 @@ class FieldFile:
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
+        ValueError: tables of one kind have different numbers of rows.
     """
 
     def __init__(
