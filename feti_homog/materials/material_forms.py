@@ -115,7 +115,7 @@ class TransverselyIsotropic:
     """Engineering constants of a phase that is isotropic in the plane, such as most fibres.
 
     Plane stress needs E_transverse and either nu_transverse or G_transverse, plane strain also E_axial and nu_axial,
-    generalized plane strain G_axial, too.
+    generalized plane strain also G_axial.
     """
 
     E_axial: float | None = stress("Young's modulus along x3; plane strain needs it.", default=None)

@@ -29,8 +29,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 
     The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
     so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`),
-    coordinates are rounded, and `mesh_order` sorts them: tables that differ by a shift, the row order or units have the
-    same mesh. Coordinates of fibres that are not discs are always rounded.
+    coordinates are rounded, and `mesh_order` sorts the fibres: tables that differ by a shift, the row order or units
+    have the same mesh. Coordinates of fibres that are not discs are always rounded.
 
     Raises:
         MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch, one line per fault; or a cut

@@ -35,8 +35,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it
-    cannot, the circle stays a polygon, as do other interfaces.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it cannot
+    flip, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
@@ -213,7 +213,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
     The conic d.A.d + b.d = 1 of least squares, with d from the mean, is |F^-1 (d - c)| = 1 for the centre c and the
-    frame F.  Returns None if it is no ellipse, or if `_distance` from the chain exceeds the tolerance.
+    frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
