@@ -30,7 +30,7 @@ RESERVE = 1 << 17  # bytes of disk space for the headers that HDF5 adds
 
 @dataclass(frozen=True)
 class _Rows:
-    """The range of this rank's rows in a shared table, ordered by rank."""
+    """The range of this rank's rows in a shared table; the table has all ranks' rows in rank order."""
 
     start: int
     count: int

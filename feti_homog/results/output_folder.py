@@ -124,7 +124,7 @@ def foreign(directory: Path, name: str, kind: str) -> CaseError:
 
 
 def _is_own(path: Path) -> bool:
-    """Return whether any version of the program wrote this result.json, result.h5, result.lock or events.log."""
+    """Return whether any version of the program wrote result.json, result.h5 or events.log; True for other files."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))

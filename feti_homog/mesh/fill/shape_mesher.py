@@ -144,7 +144,7 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
 
     h_k is at most the interface size, 2 pi R / MIN_EDGES_AROUND with the radius of curvature R at rounded corners and
     on ellipses, COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or
-    to a cell side that the outline faces; h_k is at least LEAST cell sizes.
+    to a cell side that the outline faces; h_k is at least LEAST times the longer side.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

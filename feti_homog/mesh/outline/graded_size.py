@@ -209,10 +209,10 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 
 class FromLines:
-    """The size min(h_i + g d_i, h_t + g max(0, d_t - h_t)) at the distances d_i from lines and d_t from tips.
+    """Sizes min(h_i + g d_i, h_t + g max(0, d_t - h_t)) that grow from lines and tips, with g = MAX_GROWTH.
 
-    Attributes:
-        least: lower bound of the sizes.
+    d_i and d_t are the distances to the nearest line and to the nearest tip, h_i and h_t the edge lengths on the line
+    and at the tip. `least` is a lower bound of the sizes.
     """
 
     def __init__(

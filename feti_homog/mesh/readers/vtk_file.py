@@ -162,7 +162,7 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """A reader of lines, words and arrays in a file, with big-endian binary arrays."""
+    """A reader of the lines, words and arrays in a VTK file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False

@@ -33,8 +33,8 @@ class TilePolicy:
 
     Attributes:
         least_discs: cells with fewer discs are one tile.
-        discs: discs in a tile. Small tiles put many nodes on borders, where bridges fix the positions; large tiles are
-            too few for many ranks.
+        discs: discs in a tile. Small tiles have many nodes at fixed positions on bridges; large tiles are too few for
+            many ranks.
     """
 
     least_discs: int = 400
