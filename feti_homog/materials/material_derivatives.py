@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield derivatives by given constants, in space also by expansions.  Raises as `stiffness_of` and `expansion`."""
+    """Yield a `LawChange` for each constant and, in space, expansion.  Raises as `stiffness_of` and `expansion`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -129,7 +129,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate `constants` along the changes dC and dthermal; without a thermal argument, only constants of C."""
+    """Differentiate `constants` of C and heat `thermal` along dC, dthermal; without thermal arguments, only of C."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

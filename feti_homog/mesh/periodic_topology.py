@@ -34,7 +34,7 @@ class Torus:
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) mask of edges at voids: with one triangle in the whole cell, off sides without images.
+        at_void: (torus edges,) mask of edges at voids: one triangle in the whole cell, not on a side without images.
         is_whole: whether no triangle in the cell is missing.
     """
 

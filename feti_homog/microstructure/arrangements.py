@@ -214,7 +214,7 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return coordinates (k, 2, 2) of tangents to k outlines, normal to the axes: by axis, low and high."""
+    """Return the coordinates (k, 2, 2) of tangents normal to each axis, low then high, of k outlines and rings."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 

@@ -157,7 +157,7 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
-            marked points if they all fit, points around the deepest drops for half the rest, and evenly spaced points.
+            marked points if they all fit, points around the deepest drops (up to half the rest), evenly spaced points.
         legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
     """
     if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
@@ -180,7 +180,7 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
 
 def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
-    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress.
+    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress or strain.
 
     A drop leads from a peak to the next valley.  On the first of `legs` legs (see `kept`), a drop also leads from each
     load at which bonds break to the next point that a rising load reaches.  Elsewhere, a jump leads across all points

@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a warning if a run replaces an unreadable result or another case's; else "".  Call on one rank.
+    """Return a warning if a run replaces an unreadable result, or one of another case; else "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -245,7 +245,7 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 def write_product(path: Path, text: str) -> Path:
     """Write the output of a command (a card or a fibre table) to a file; return its path.
 
-    If `path` is a link, the function replaces the file at its target.
+    If `path` is a link, the function replaces the file at its target. Unfinished files of ended commands are removed.
 
     Raises:
         CaseError: `path` is a folder, a device or a pipe, lies in no folder, or has the name of a result file.

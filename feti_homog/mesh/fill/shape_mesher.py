@@ -108,7 +108,7 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
-    """Add the surface of an ellipse, or of a polygon with a margin; return the tag."""
+    """Add the surface of an ellipse, or of a polygon with the margin, if any; return the tag."""
     occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)

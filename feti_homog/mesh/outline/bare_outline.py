@@ -140,7 +140,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Divide curves into arcs; also return start points (a, 2), and a mask (a,) of points off `border` (b, 2)."""
+    """Return arcs as `outline.arcs_within`, start points (a, 2), and the mask (a,) of points off `border` (b, 2)."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

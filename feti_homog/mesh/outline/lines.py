@@ -22,7 +22,7 @@ SAMPLES_OF_AN_EDGE = 3
 
 @dataclass(frozen=True)
 class Curves:
-    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
+    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around the cell or disc.
 
     Attributes:
         node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.

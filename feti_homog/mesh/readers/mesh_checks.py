@@ -209,7 +209,7 @@ def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes without a partner, except on the side with fewer nodes, and sides without inner nodes."""
+    """List sides without inner nodes, and nodes without a partner, except on the side with fewer nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))

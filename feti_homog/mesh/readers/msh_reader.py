@@ -124,7 +124,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError if there are faults."""
+    """Raise MeshError if there are faults; each line begins with `path`."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 

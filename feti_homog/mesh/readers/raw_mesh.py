@@ -49,7 +49,7 @@ class RawMesh:
         element_tags: (m,) element numbers in the file.
         triangles: (m, 3) nodes, numbered from 0.
         group: (m,) index of each element into `groups`.
-        groups: names of the physical surfaces or sets in each combination that elements belong to.
+        groups: for each group, the names of the physical surfaces or sets that its elements belong to.
         curves: (d, 2) node tags at the line ends in each physical curve or line set, by name.
         middles: the middle nodes in second-order triangles.
         aliases: other names of each group, which a case may select; may be empty.

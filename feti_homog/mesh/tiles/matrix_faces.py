@@ -157,7 +157,7 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """The tiles of the matrix faces, which are cells of a grid.
+    """The tiles of the matrix faces; a tile is a cell of a grid.
 
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.

@@ -242,7 +242,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Make the torus of filled tiles, without voids; also return the tile (m,) of each triangle.
+    """Make the torus of filled tiles without triangles in voids; also return the tile (m,) of each triangle.
 
     `all_nodes` is the node count in the cell.
     """

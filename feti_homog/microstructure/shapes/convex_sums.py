@@ -132,7 +132,7 @@ class PolygonalRows:
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
+        """Yield each check of this shape: the mask (N,) of faulty rows, maybe all False, and the message."""
         (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
         are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
         yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"

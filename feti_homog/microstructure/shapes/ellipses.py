@@ -182,7 +182,7 @@ class EllipticRows:
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
+        """Yield each check of this shape: the mask (N,) of faulty rows, maybe all False, and the message."""
         a, b = rows["a"], rows["b"]
         thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
         yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"

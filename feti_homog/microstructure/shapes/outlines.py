@@ -55,7 +55,7 @@ class ConvexCurves:
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Return the curves followed by other curves; all cores have one number of corners."""
+        """Return the curves followed by other curves; all cores must have the same number of corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
