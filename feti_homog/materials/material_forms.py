@@ -225,7 +225,7 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
 
 
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
-    """Compute the utilisations (n,) of the four `MODES`; at most 0 where the stress has not the sign of the mode.
+    """Compute utilisations (n,) of the `MODES` from strengths `limits`; at most 0 for stresses of the opposite sign.
 
     A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """

@@ -205,7 +205,7 @@ def _check_names(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Check the cells of all rows, and build the table.  Raises CaseError with earlier and further faults."""
+    """Check all `rows`, and build the table with size and corner from `sizes`.  Raises CaseError with all `faults`."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
         for key in ("x", "y", *([] if has_size else ["radius"])):

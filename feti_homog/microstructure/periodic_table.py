@@ -221,7 +221,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Find the pairs of near fibres among the rows `kept` (k,).
+    """Find the pairs of near fibres among the rows `kept` (k,), with the outlines `outer`.
 
     Returns, all (p,): indices into `kept` of both fibres, gaps, radius sums, and the mask of pairs across the border.
     """

@@ -98,7 +98,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
-    """Return the quantiles (count, SHELLS) of the neighbour distances in a pattern.
+    """Return the quantiles (count, SHELLS) of the neighbour distances in the pattern `measured`.
 
     The levels are (i + 1/2) / count; the unit is the mean diameter. Raises ValueError if a window is too small.
     """

@@ -65,7 +65,10 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg with a positive count, named in `counts`; else all points."""
+    """Return the points up to the end of the first leg with damage; without damage, all points.
+
+    A point has damage if one of the entries `counts`, such as `broke`, is positive.
+    """
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 

@@ -146,7 +146,7 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV.  An apostrophe precedes strings that a spreadsheet would evaluate."""
+    """Return rows as CSV with line ends `end`.  An apostrophe precedes strings that a spreadsheet would evaluate."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -228,7 +228,7 @@ class FileSeal:
 
 
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
-    """Return the size and checksum of a file.
+    """Return the size and checksum of a file, read in blocks of `block` bytes.
 
     Call on the rank that completed the file: other ranks may still see an earlier file of that name.  Raises
     FetiHomogError if the file cannot be read.
@@ -240,7 +240,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Check a file against its seal.  Call on one rank.
+    """Check a file against its seal; `block` is as in `seal`.  Call on one rank.
 
     Raises:
         CaseError: size or checksum differ.
@@ -265,7 +265,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize a value with indents.  An array of numbers, or a row of a matrix, takes one line."""
+    """Serialize a value with line breaks and indents `begin`.  An array of numbers, or a matrix row, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

@@ -36,7 +36,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.  MeshError for too many elements."""
+    """Mesh convex outlines; arguments as in `UnmeshedCell`.  MeshError for many elements, Exception if gmsh fails."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:

@@ -190,7 +190,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2) onto a circle, side nodes along the side; None for corners and nodes that cannot reach it."""
+    """Move points (k, 2), images of `places`, onto a circle, side nodes along sides; None if a point cannot move."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
