@@ -89,7 +89,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC for each entry of a given stiffness.  Entries ij and ji change together."""
+    """Yield name, value and dC for entries of a given stiffness except COUPLINGS; entries ij and ji change together."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:

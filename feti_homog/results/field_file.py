@@ -100,7 +100,7 @@ class FieldFile:
         """Complete the file, give it its final name, and return its path."""
 
         def complete() -> None:
-            """Add views and rename the file.  On one rank: on all ranks, views would cost as much as tables."""
+            """Add views and rename the file.  Call on one rank: on all ranks, views would cost as much as tables."""
             # No lock: only this process has the file open, and some file systems have no locks.
             with h5py.File(self.part, "r", locking=False) as file:
                 size = (1 << 12) * (1 + len(field_layout.views_of(file)))  # measured: 0.9 KB for each view on average

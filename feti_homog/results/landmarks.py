@@ -111,7 +111,7 @@ def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float
 
 
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Name the largest stress: PEAK before a fall, SO_FAR on an unfinished path, else LARGEST."""
+    """Name the largest stress: SO_FAR if `peak` has an entry `so_far`, PEAK before a fall, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK

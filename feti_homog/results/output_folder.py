@@ -142,8 +142,8 @@ def latest(directory: Path) -> dict[str, Any]:
     """Return the document of result.json or of the checkpoint.  Call on one rank.
 
     The checkpoint counts if it has more points, or result.json is missing or of another case; then `unfinished` and
-    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, FetiHomogError for
-    missing permissions.
+    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, or unreadable
+    events, FetiHomogError for an unreadable result.json.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 

@@ -59,7 +59,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
     """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps`.
 
     `width` and `curvature` are (k,); `caps` has a limit for each face, () or (k,). The edge length is PASSAGE_EDGE
-    times the passage width, or less if the edges on the other face are shorter. The length grows more slowly than twice
+    times the passage width, or less if the edges on the other face are shorter. The length grows, but to at most twice
     the width w + c s^2 / 2 at the distance s along a passage of curvature c.
     """
     growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))

@@ -156,8 +156,7 @@ class _Content:
     def raw_mesh(self) -> RawMesh:
         """Return the mesh, with triangles grouped by set names, and with sets of lines as curves.
 
-        Raises:
-            MeshError: triangles, nodes of elements, or sets of sections are missing.
+        Raises MeshError if triangles, nodes of elements, or sets of sections are missing.
         """
         faults = [] if self.triangles else ["no triangles in it"]
         elements = self.triangles | self.lines
