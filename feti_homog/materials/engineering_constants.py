@@ -95,7 +95,8 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
     The table has Cij of the upper triangle without COUPLINGS, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with
     S = C^-1; in space also the constants of `about_fibres` and, from the stress `heat` (6,) under a unit temperature,
-    normal thermal stresses, free strains and their mean across.  Raises numpy.linalg.LinAlgError if C is singular.
+    normal thermal stresses, free normal strains -S heat and their mean across the fibres.  Raises
+    numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
@@ -158,10 +159,10 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return the bulk and shear moduli k and mu of the isotropic stiffness nearest to a plane stiffness (3, 3).
+    """Return the bulk modulus k and the shear modulus mu of the nearest isotropic stiffness.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8, nearest in the Frobenius norm.  Both moduli
-    are equal in all axes.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8 for a plane stiffness C (3, 3), nearest in the
+    Frobenius norm of tensors.  Turns of the axes change neither.
     """
     c = np.asarray(stiffness, dtype=float)
     bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
@@ -176,13 +177,13 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3) from the nearest isotropic stiffness, equal in all axes."""
+    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3), in any axes, from the nearest isotropic stiffness."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
 
 def _distance(C: Float, nearest: Float) -> float:
-    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses in the Frobenius norm of tensors."""
+    """Return the relative distance ||C - nearest|| / ||C|| in the Frobenius norm of tensors."""
     scale = _MANDEL[len(C)]
     return float(np.linalg.norm(scale * (C - nearest)) / np.linalg.norm(scale * C))
 
@@ -228,7 +229,7 @@ def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """Return the ranges of the moduli E and G of a stiffness (6, 6) over DIRECTIONS directions n across x3.
+    """Return the ranges of E and G of a stiffness (6, 6) over DIRECTIONS directions n across x3.
 
     1/E = sigma:S:sigma with the compliance S and sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to
     n and x3.  Raises numpy.linalg.LinAlgError if the stiffness is singular.

@@ -72,7 +72,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3): q = -k grad T in the cell's axes.  Raises ValueError unless k is given and positive definite."""
+    """Return k (3, 3): q = -k grad T in cell axes.  ValueError unless k is given, symmetric and positive definite."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
@@ -270,7 +270,7 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return the faults and the warnings about the contrast between phases, of stiffness or conductivity."""
+    """Return faults and warnings about contrasts of stiffness or conductivity.  Raises ValueError as `stiffness_of`."""
     noun = "conductivities" if voigt.PLANE_STATES[plane].is_scalar else "stiffnesses"
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}

@@ -141,7 +141,8 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
     """Flip the chords of triangles (m, 3) with two edges on one circle; return all triangles.
 
     Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
-    by the other diagonal of the two triangles at the chord. Chords between phases, or of one triangle, stay.
+    by the other diagonal of both triangles at the chord. Chords between phases or of one triangle stay. `nodes` is the
+    node count.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -164,7 +165,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find the triangles (b,) with two edges on one circle, and the corner (b,) between them, among `nodes` nodes."""
+    """Find triangles (b,) with two edges on one circle, and the corner (b,) between both; `nodes` is the node count."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

@@ -34,7 +34,7 @@ def header(cell: unit_cell.TornCell) -> Header:
 
 
 def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
-    """Concatenate the refined meshes of this rank's subdomains."""
+    """Concatenate the refined meshes of this rank's subdomains; nodes are numbered from 0 on each rank."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -93,11 +93,9 @@ def state_parts(
 ) -> Iterator[StatePart]:
     """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
 
-    A state has a response in the plane problem and, if there is one, in the axial problem; conduction takes the place
-    of the axial problem.  A problem without a response (None) has zero fields.
-
-    Raises:
-        ValueError: a state has no response.
+    `states` maps labels to responses: in the plane problem and, if there is one, in the axial problem; conduction takes
+    the place of the axial problem.  A problem without a response (None) has zero fields.  `load_factor` and `point` are
+    as in `StatePart`.  Raises ValueError if a state has no response.
     """
     axial_cell = cell.axial or cell
     for number, (label, responses) in enumerate(states.items()):

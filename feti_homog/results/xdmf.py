@@ -1,8 +1,8 @@
 """Write result.xdmf and interface.xdmf, which let ParaView read result.h5.
 
 The files use only features that all XDMF readers of ParaView and VTK support: whole datasets, points with a
-connectivity, tensors with nine components, one collection per file.  Readers load no strings, so a state label is
-the name of a block, which two readers show, and an array of bytes, with the same length in all states.
+connectivity, tensors with nine components, one temporal collection per file.  Readers load no strings, so a state label
+is the name of a block, which two readers show, and an array of bytes, with the same length in all states.
 """
 
 from collections.abc import Mapping, Sequence

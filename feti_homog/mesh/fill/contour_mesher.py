@@ -27,7 +27,8 @@ from feti_homog.typing import Bool, Float, Int32
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
     """Mesh the regions of an image with phase numbers (rows, columns) within smooth outlines.
 
-    A Gaussian filter, one pixel wide, smooths the mask `_every_other`; splines follow the contour of equal area.
+    A Gaussian filter, with a standard deviation of one pixel, smooths the mask from `_every_other`; splines follow the
+    contour that encloses the area of the mask.
 
     Raises:
         CaseError: scikit-image is not installed.
@@ -79,7 +80,10 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Mark pixels (rows, columns) of the phases 1, 3, ... contacts from the matrix; MeshError if three phases touch."""
+    """Return the mask (rows, columns) of the phases that are 1, 3, ... contacts away from the matrix.
+
+    Raises MeshError if three phases touch: then two neighbours are both in the mask, or both outside.
+    """
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
     a, b = a[a != b], b[a != b]
@@ -94,8 +98,9 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
     """Return the field of edge sizes, in cell widths, for `curves` of points (k, 2), in pixels.
 
-    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number. Edges
-    are shorter in narrow passages, between points with opposite gradients of the `indicator`.
+    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number, unless
+    the edges would be shorter than a pixel. Edges are shorter in narrow passages, between points with opposite
+    gradients of the `indicator`; `largest` is the upper limit.
     """
     unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
     points = np.concatenate([np.zeros((1, 2)), *curves])

@@ -14,9 +14,9 @@ from feti_homog.typing import Bool
 def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> CoarseMesh:
     """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
-    Raises:
-        CaseError, MeshError: as in `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`;
-            also for pixels that voids cut off, and for voids at sides with tractions.
+    Messages propose the phases in `materials`.  Raises CaseError and MeshError as `msh_reader.read`,
+    `label_image.read_labels` and `contour_mesher.mesh_contours` do, also for pixels that voids cut off, and for voids
+    at sides with tractions.
     """
     assert cell.file is not None
     if cell.geometry == "mesh":
@@ -54,7 +54,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List pixels that voids cut off from others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
+    """List faults: pixels that voids cut off, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:

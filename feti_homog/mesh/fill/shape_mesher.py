@@ -36,11 +36,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.
-
-    Raises:
-        MeshError: the mesh would have too many elements.
-    """
+    """Mesh convex outlines; arguments as in `UnmeshedCell`.  MeshError for many elements, Exception if gmsh fails."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
@@ -112,7 +108,7 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
-    """Add the surface of an ellipse, or of a polygon with a margin; return the tag."""
+    """Add the surface of an ellipse, or of a polygon with the margin, if any; return the tag."""
     occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)
@@ -146,9 +142,9 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
-    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle of curvature at corners and on ellipses,
-    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
-    side that the outline faces; it is at least LEAST cell sizes.
+    h_k is at most the interface size, 2 pi R / MIN_EDGES_AROUND with the radius of curvature R at rounded corners and
+    on ellipses, COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or
+    to a cell side that the outline faces; h_k is at least LEAST times the longer side.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)

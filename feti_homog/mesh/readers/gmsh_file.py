@@ -81,7 +81,8 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other elements than triangles, quadrilaterals and lines.
+        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals and
+            lines.
     """
     data = input_files.read(path)
     sections = _sections(data.removeprefix(codecs.BOM_UTF8))

@@ -124,7 +124,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError if there are faults."""
+    """Raise MeshError if there are faults; each line begins with `path`."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 
@@ -132,10 +132,10 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
-    on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
-    to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
-    beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
+    A side lies at the median of all outer nodes within `tolerance`, relative to the width, of the outermost node. Two
+    nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
+    move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
+    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
@@ -185,7 +185,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phases that select its name or, if none does, one of its aliases.
+    """Rename each group to the phases that select its name or number or, if none does, one of its aliases.
 
     Other groups keep their names. The entry `debonded` selects curves.
 
