@@ -118,20 +118,27 @@ def unit_errors(
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
     """Estimate the mesh errors of the unit loads, problem by problem.  Collective.
 
-    Also returns the responses, with element errors if a later step uses these errors.  The list of errors is empty if
-    the case has `mesh_error = false`.
+    Also returns the responses with element errors.  The list of errors is empty if the case has `mesh_error = false`.
     """
     if not context.case.output.mesh_error:
         return [], responses
+    return _estimates(context, context.loads.by_problem(responses))
+
+
+def _estimates(
+    context: AnalysisContext, groups: Sequence[Sequence[averaging.Response]]
+) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
+    """Estimate the mesh errors of the responses of each problem, in one group; see `unit_errors`.  Collective."""
     from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
 
-    errors: list[mesh_estimate.EnergyErrors] = []
-    shared, keep = list[averaging.Response](), context.recovers_again
-    for problem, group in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
+    errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
+    for problem, responses in zip(context.loads.problems, groups, strict=False):
+        # Estimate and record share one recovery.
+        group = averaging.recovered(problem.cell, responses) if context.states.is_recording else responses
         touches = problem.interface.contact and any(response.debonded for response in group)
-        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, keep))
-        shared += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
-    return errors, shared if keep else responses
+        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
+        estimated += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
+    return errors, estimated
 
 
 def mesh_error(
@@ -229,19 +236,15 @@ def state_error(
 ) -> tuple[dict[str, float], list[averaging.Response]]:
     """Estimate the mesh error of the energy under one load.  Collective.
 
-    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses,
-    with element errors if a later step uses these errors.
+    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses
+    with element errors.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
-    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
-
-    keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
-    errors = [mesh_estimate.energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
+    errors, estimated = _estimates(context, [[response] for response in responses])
     energy = sum(2 * response.stored for response in responses)
     size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
-    shared = [replace(r, shares=e.shares[:, 0] if keep else None) for r, e in zip(responses, errors, strict=True)]
-    return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
+    return {"mesh_error": size / energy if energy > 0 else 0.0}, estimated
 
 
 def check_accuracy(context: AnalysisContext) -> None:

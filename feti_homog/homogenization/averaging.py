@@ -4,7 +4,7 @@ A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ class Response:
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
+        inside: (dofs,) u* in this rank's parts; (0,) unless `recovered`.
     """
 
     strain: Float
@@ -59,6 +60,7 @@ class Response:
     counts: dict[str, int]
     damage: Float
     shares: Float | None = None
+    inside: Float = field(default_factory=lambda: np.zeros(0))
 
     @property
     def leading(self) -> str:
@@ -81,6 +83,15 @@ class Response:
     def debonded(self) -> int:
         """The number of debonded interface nodes."""
         return self.counts["open"] + self.counts["closed"]
+
+
+def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
+    """Return the responses with u* inside the subdomains.  Collective."""
+    if all(len(response.inside) == cell.offsets[-1] for response in responses):
+        return list(responses)
+    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
+    columns = cell.extended(u, loads).T
+    return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
 
 
 class Homogenization:

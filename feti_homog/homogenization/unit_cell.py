@@ -82,16 +82,23 @@ class TornCell:
         """The operator that finds the multipliers between parts.  Collective when first read."""
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
-    def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its displacements u*, extended from the boundary displacements.
+    @property
+    def keeps_interiors(self) -> bool:
+        """Whether the run recovers many states, which makes the factors of interiors worth their memory."""
+        return self.case.analysis.type == "angle" or (self.case.section.is_followed and self.case.output.fields)
 
-        `u` is (boundary dofs, k), `loads` are (v, k), and u* is (dofs, k); `keep` stores the factors.
-        """
-        number, extended = -1, np.zeros(0)
-        for part in self.parts:
-            if part.place != number:
-                number, extended = part.place, self.solver.extended(part.place, u, loads, keep)
-            yield part, extended[part.dofs]
+    def extended(self, u: Float, loads: Float) -> Float:
+        """Extend boundary displacements u (boundary dofs, k) to u* (dofs, k) in all parts, under loads (v, k)."""
+        inside, place, of_place = np.empty((self.offsets[-1], u.shape[1]), order="F"), -1, np.zeros(0)
+        for part, of_part in self.by_part(inside):
+            if part.place != place:
+                place, of_place = part.place, self.solver.extended(part.place, u, loads, self.keeps_interiors)
+            of_part[:] = of_place[part.dofs]
+        return inside
+
+    def by_part(self, u: Float) -> Iterator[tuple[UniformPart, Float]]:
+        """Return each part with its rows of displacements u (dofs, ...)."""
+        return zip(self.parts, np.split(u, self.offsets[1:-1]), strict=False)
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
         """Return the multipliers and openings between parts.  Collective.
