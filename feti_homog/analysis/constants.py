@@ -14,7 +14,7 @@ from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.errors import NotCarriedError
-from feti_homog.homogenization import averaging, phase_laws, unit_cell
+from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
 from feti_homog.materials import engineering_constants, laws, phase_bounds
 from feti_homog.microstructure import phase_names
 from feti_homog.system.runtime import records
@@ -134,7 +134,7 @@ def _estimates(
     errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
     for problem, responses in zip(context.loads.problems, groups, strict=False):
         # Estimate and record share one recovery.
-        group = averaging.recovered(problem.cell, responses) if context.states.is_recording else responses
+        group = recovered_fields.recovered(problem.cell, responses) if context.states.is_recording else responses
         touches = problem.interface.contact and any(response.debonded for response in group)
         errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
         estimated += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]

@@ -46,7 +46,7 @@ class Response:
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
-        inside: (dofs,) u* in this rank's parts; (0,) unless `recovered`.
+        inside: (dofs,) u* in this rank's parts; (0,) before `recovered_fields.recovered`.
     """
 
     strain: Float
@@ -83,15 +83,6 @@ class Response:
     def debonded(self) -> int:
         """The number of debonded interface nodes."""
         return self.counts["open"] + self.counts["closed"]
-
-
-def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
-    """Return the responses with u* inside the subdomains.  Collective."""
-    if all(len(response.inside) == cell.offsets[-1] for response in responses):
-        return list(responses)
-    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
-    columns = cell.extended(u, loads).T
-    return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
 
 
 class Homogenization:

@@ -14,7 +14,8 @@ from mpi4py import MPI
 
 from feti_homog.fem import arc_error, local_fits, stress_recovery
 from feti_homog.feti.decomposition import Subdomain
-from feti_homog.homogenization.averaging import Response, recovered
+from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.recovered_fields import recovered
 from feti_homog.homogenization.uniform_parts import NONE, UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED

@@ -5,13 +5,13 @@ integration points: one point in a linear element, six points in a quadratic ele
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from feti_homog.fem import Problem, stress_recovery
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import FibreInterfaces, Response, recovered
+from feti_homog.homogenization.averaging import FibreInterfaces, Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import Contact
@@ -56,6 +56,15 @@ class NodalFields:
     displacement: Float
     traction: Float
     jump: Float
+
+
+def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
+    """Return the responses with u* inside the subdomains.  Collective."""
+    if all(len(response.inside) == cell.offsets[-1] for response in responses):
+        return list(responses)
+    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
+    columns = cell.extended(u, loads).T
+    return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
 
 
 def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> RecoveredFields:

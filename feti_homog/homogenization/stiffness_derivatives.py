@@ -21,8 +21,9 @@ import numpy as np
 from feti_homog.case import Case, cell_section, material_sections
 from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response, recovered
+from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
+from feti_homog.homogenization.recovered_fields import recovered
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
