@@ -138,8 +138,8 @@ def _recovered(
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
     """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
-    On a coarser `lattice` each subdomain has a new equilibrium, with factors that the cell may keep.  Subdomains across
-    materials take the fine displacements at the coarse nodes instead; the estimates are hardly smaller.
+    On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
+    displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
@@ -147,8 +147,7 @@ def _recovered(
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
     solved = list[tuple[list[Subdomain] | list[UniformPart], FineMesh, Float, Int]]()
     if is_nested and not across:
-        interiors = cell.nested_interiors if cell.keeps_interiors else nested_interiors(boundary, cell.lattice, lattice)
-        for interior in interiors:
+        for interior in nested_interiors(boundary, cell.lattice, lattice):
             displacement = interior.displacement(u, loads)
             position = np.full(displacement.shape[0] * displacement.shape[1], NONE)
             position[interior.fixed] = interior.place

@@ -14,6 +14,7 @@ from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.uniform_parts import nested_interiors
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -142,13 +143,10 @@ def test_interiors_are_kept_for_many_states_alone_and_errors_are_the_same(comm, 
     cell, _, responses = solve(make_case(order=2, mesh_size=0.2, refine=refine), comm)
     kept = cell.solver.interface_operators.interiors
     lean = energy_errors(cell, responses)
-    assert not kept and "nested_interiors" not in vars(cell)
+    assert not kept
     many = replace(cell, case=replace(cell.case, analysis=replace(cell.case.analysis, type="angle")))
     whole = energy_errors(many, responses)
-    if refine:
-        assert not kept and sum(len(each.members) for each in many.nested_interiors) == len(cell.subdomains)
-    else:
-        assert len(kept) == len(cell.subdomains)
+    assert len(kept) == (0 if refine else len(cell.subdomains))
     np.testing.assert_allclose(lean.elements, whole.elements, rtol=1e-9, atol=1e-12 * whole.elements.max())
     np.testing.assert_allclose(lean.arcs, whole.arcs, rtol=1e-9, atol=1e-12 * np.abs(whole.arcs).max())
     shares = comm.allreduce(whole.shares.sum(axis=0))
@@ -210,7 +208,7 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     k, nested = len(responses), cell.nested_lattice.within(cell.lattice)
     fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
     largest = 0.0
-    for interior in cell.nested_interiors:
+    for interior in nested_interiors(cell.solver.interface_operators, cell.lattice, cell.nested_lattice):
         coarse, first = interior.displacement(u, loads), 0
         for s in interior.members:
             there = next(fine).reshape(-1, 2, k)[s.mesh.node_class[s.mesh.nodes[:, nested]]]
