@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, unit_errors
+from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, response_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.homogenization import averaging, phase_laws, unit_cell
@@ -22,7 +22,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     k = columns["stiffness"]
-    errors, responses = unit_errors(context, responses)
+    errors, responses = response_errors(context, context.loads.by_problem(responses))
     context.record_unit_states(responses, 1.0, "", 0)
     context.checks.require("k^ef", {"symmetry": averaging.asymmetry(k)})
     document: dict[str, Any] = {"effective_conductivity": k}

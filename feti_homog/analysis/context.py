@@ -149,11 +149,6 @@ class AnalysisContext:
         """Return the case of the cell."""
         return self.cell.case
 
-    @property
-    def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, which makes factors worth their memory."""
-        return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
-
     def bonds(self, opening: float | None) -> BondState:
         """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))

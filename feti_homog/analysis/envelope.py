@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.analysis.constants import constants, mesh_error, unit_errors
+from feti_homog.analysis.constants import constants, mesh_error, response_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
@@ -57,7 +57,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             "superposes loads, which contact forbids"
         )
     columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
-    errors, responses = unit_errors(context, responses)
+    errors, responses = response_errors(context, context.loads.by_problem(responses))
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})

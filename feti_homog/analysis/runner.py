@@ -138,20 +138,19 @@ def _run_and_write(
         context.checkpoint.clear()
     standard_streams.remarks.clear()
 
-    def draw() -> list[Path]:
-        from feti_homog.report.plots import figures  # loads Matplotlib, on this rank only
+    if output.pictures:
+        with progress.stage("pictures") as line:
+            from feti_homog.report.plots import figures  # loads Matplotlib
 
-        return figures.plot(directory)
+            document = mpi_errors.on_root(cell.comm, output_folder.latest, directory)
+            share = slice(cell.comm.rank, None, cell.comm.size)
+            paths = cell.comm.allgather(mpi_errors.agree(cell.comm, figures.draw, directory, document, share))
+            line.append(", ".join(sorted(path.name for drawn in paths for path in drawn)))
+    if output.report:
+        with progress.stage("report") as line:
+            from feti_homog.report import page  # loads tables
 
-    def report() -> list[Path]:
-        from feti_homog.report import page  # loads tables, on this rank only
-
-        return [page.write(directory)]
-
-    for name, is_asked, make in (("pictures", output.pictures, draw), ("report", output.report, report)):
-        if is_asked:
-            with progress.stage(name) as line:
-                line.append(", ".join(path.name for path in mpi_errors.on_root(cell.comm, make)))
+            line.append(mpi_errors.on_root(cell.comm, page.write, directory).name)
     _print_summary(result, progress)
     return result
 

@@ -197,10 +197,10 @@ class RecoveredStress:
             result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
         return result.reshape(*points.shape[:2], *shape)
 
-    def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
+    def difference(self) -> tuple[Float, Float]:
         """Compute the energy products of the difference ds between recovered and element stresses.
 
-        Returns int ds_i : S : ds_j (k, k), S the flexibility, and its diagonal (e, k) by element; (0, k) if not wanted.
+        Returns int ds_i : S : ds_j (k, k), S the flexibility, and its diagonal (e, k) by element.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]
@@ -221,6 +221,5 @@ class RecoveredStress:
             difference = (difference.reshape(-1, m * k) @ root).reshape(difference.shape)
             flat = difference.reshape(-1, k)
             total += flat.T @ flat
-            if with_shares:
-                shares.append(np.einsum("qemk,qemk->ek", difference, difference))
+            shares.append(np.einsum("qemk,qemk->ek", difference, difference))
         return total, np.concatenate(shares)

@@ -4,7 +4,7 @@ A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ class Response:
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
+        inside: (dofs,) u* in this rank's parts; (0,) before `recovered_fields.recovered`.
     """
 
     strain: Float
@@ -59,6 +60,7 @@ class Response:
     counts: dict[str, int]
     damage: Float
     shares: Float | None = None
+    inside: Float = field(default_factory=lambda: np.zeros(0))
 
     @property
     def leading(self) -> str:

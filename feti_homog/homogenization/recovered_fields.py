@@ -5,7 +5,7 @@ integration points: one point in a linear element, six points in a quadratic ele
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +60,15 @@ class NodalFields:
     jump: Float
 
 
+def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
+    """Return the responses with u* inside the subdomains.  Collective."""
+    if all(len(response.inside) == cell.offsets[-1] for response in responses):
+        return list(responses)
+    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
+    columns = cell.extended(u, loads).T
+    return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
+
+
 def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> RecoveredFields:
     """Recover the fields of all states, in one pass over the parts.  Collective.
 
@@ -96,21 +105,10 @@ def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: P
         return NodalFields(np.zeros((n, c)), np.zeros((k, c)), np.zeros((k, c)))
     lam, opening = cell.across_bonds(response.solution, u)
     H, totals = problem.gradient(response.strain[: problem.strains]), [np.zeros((0, c))]
-    for part, offset in zip(cell.parts, cell.offsets, strict=False):
-        of_part = u[offset : offset + len(part.dofs)].reshape(-1, c)
-        totals.append(part.mesh.points @ H.T + of_part[part.mesh.node_class])
+    for part, of_part in cell.by_part(u):
+        totals.append(part.mesh.points @ H.T + of_part.reshape(-1, c)[part.mesh.node_class])
     pair = nodes.row[:, None] + np.arange(c)
     return NodalFields(np.concatenate(totals), lam[pair] / nodes.length[:, None], opening[pair])
-
-
-def error_shares(cell: TornCell, response: Response) -> Float:
-    """Return the contributions (e,) of elements to the error of E . Sigma; NaN without estimates.  Collective."""
-    shares = response.shares
-    if shares is None and cell.case.output.mesh_error:
-        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
-
-        shares = energy_errors(cell, [response]).shares[:, 0]
-    return np.full(sum(len(part.mesh.triangles) for part in cell.parts), np.nan) if shares is None else shares
 
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
@@ -135,10 +133,10 @@ def _stresses(
     errors; they are 0 in states without a response.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
-    u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
-    loads = all_loads[: len(cell.solver.problem.loads)]
-    for (part, displacement), offset in zip(cell.displacements(u, all_loads), cell.offsets, strict=False):
-        out[offset : offset + len(displacement), at] = displacement
+    present = recovered(cell, [response for response in responses if response is not None])
+    out[:, at] = np.stack([response.inside for response in present], axis=1)
+    loads = np.stack([response.all_loads for response in present], axis=1)[: len(cell.solver.problem.loads)]
+    for part, displacement in cell.by_part(out[:, at]):
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from the stresses conjugate to strains of displacements.
         rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))

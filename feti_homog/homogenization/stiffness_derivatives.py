@@ -24,6 +24,7 @@ from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
+from feti_homog.homogenization.recovered_fields import recovered
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
@@ -98,9 +99,9 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the derivatives (k, k) of |UC| C with respect
     to ln R of all fibres, which are 0 unless the case has a fraction in `_fractions`.
     """
-    problem, all_loads = cell.solver.problem, np.stack([response.all_loads for response in responses], axis=1)
-    loads = all_loads[: len(problem.loads)]
-    boundary = np.stack([response.u for response in responses], axis=1)
+    problem = cell.solver.problem
+    loads = np.stack([response.all_loads for response in responses], axis=1)[: len(problem.loads)]
+    inside = np.stack([response.inside for response in recovered(cell, responses)], axis=1)
     m, (v, k) = problem.strains, loads.shape
     # T maps [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))
@@ -108,7 +109,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for s, displacement in cell.displacements(boundary, all_loads):
+    for s, displacement in cell.by_part(inside):
         u = displacement.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):

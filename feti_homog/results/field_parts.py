@@ -103,15 +103,14 @@ def state_parts(
         response, stress = plane or axial, fields.stress[number]
         if response is None:
             raise ValueError("expected a response")
-        shares = [
-            recovered_fields.error_shares(torn, r) for torn, r in ((cell, plane), (axial_cell, axial)) if r is not None
-        ]
+        shares = [part.shares for part in (plane, axial) if part is not None and part.shares is not None]
+        errors = np.sum(shares or [np.full(stress.shape[1], np.nan)], axis=0)
         u = [x[:, number] for x in fields.displacement]
         problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
         in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
         common: dict[str, Any] = {"load_factor": load_factor, "point": point, "label": label}
         energy = sum(2 * part.stored for part in responses if part is not None)  # E . Sigma
-        common["mesh_error"] = (np.sum(shares, axis=0) / (energy if energy > 0 else 1.0)).astype(np.float32)
+        common["mesh_error"] = (errors / (energy if energy > 0 else 1.0)).astype(np.float32)
         common["stress_33"] = stress[2]
         common["stress"] = stress[voigt.IN_PLANE].T
         if plane is not None and cell.axial is None:

@@ -69,11 +69,8 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
             lines.append((1, occ.addSpline(tags)))
         occ.fragment([(2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))], lines)
         occ.synchronize()
-        try:
-            content = filled(gmsh, size, field)
-        except Exception as error:  # gmsh raises only Exception
-            advice = "expected larger regions of a phase: filter the image, or smooth = false"
-            raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
+        advice = "larger regions of a phase: filter the image, or smooth = false"
+        content = filled(gmsh, size, field, "smooth = true", advice)
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
     place = i + 0.5 - width * (2 * i > width), j + 0.5 - rows * (2 * j > rows)
     return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]))

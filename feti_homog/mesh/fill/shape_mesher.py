@@ -12,6 +12,7 @@ from types import ModuleType
 import numpy as np
 from scipy.spatial import cKDTree
 
+from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.element_estimate import refuse_many
 from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
@@ -36,12 +37,12 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh convex outlines; arguments as in `UnmeshedCell`.  MeshError for many elements, Exception if gmsh fails."""
+    """Mesh convex outlines; arguments as in `UnmeshedCell`.  raises like `refuse_many` and `filled`."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
-        raw = raw_mesh(filled(gmsh, arrangement.size, field))
+        raw = raw_mesh(filled(gmsh, arrangement.size, field, "fibres", "larger gaps or another mesh_size"))
         precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
     return replace(
         made(raw, "table").scaled(scale),
@@ -51,8 +52,8 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
     )
 
 
-def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
-    """Fill the surfaces of a cell with periodic second-order triangles, sized by `field`; raises gmsh's Exception."""
+def filled(gmsh: ModuleType, size: Float, field: SizeField, key: str, advice: str) -> MshContent:
+    """Fill the surfaces with periodic second-order triangles, sized by `field`.  If gmsh fails, raises MeshError."""
     # Curves on the right and upper sides copy the nodes of the left and lower sides.
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -79,7 +80,10 @@ def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
                 part.tofile(stream)
         gmsh.model.mesh.field.setString(structured, "FileName", str(path))
         gmsh.model.mesh.field.setAsBackgroundMesh(structured)
-        gmsh.model.mesh.generate(2)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:  # gmsh raises only Exception
+            raise MeshError(f"[cell] {key}: gmsh cannot fill the outlines ({error}); expected {advice}") from None
         gmsh.model.mesh.setOrder(2)
         return MshContent.of(gmsh)
 
