@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from PIL import Image
+from support.cases import case_of
 from support.other_formats import written
 from support.pixel_images import MATERIALS, case, quadrilaterals, random_image
 
@@ -229,3 +230,20 @@ def test_a_label_without_pixels_is_a_fault(tmp_path):
     with pytest.raises(CaseError) as caught:
         label_image.read_labels(stored(tmp_path / "a.png", 2 * GREY), LABELS, False)
     assert caught.value.faults[1].endswith(line)
+
+
+@pytest.mark.parametrize("smooth", [False, True], ids=["polygons", "smooth"])
+def test_failures_of_gmsh_name_a_cure(tmp_path, monkeypatch, smooth):
+    def fail(dimension):
+        raise Exception("no memory")  # gmsh raises this class
+
+    gmsh = pytest.importorskip("gmsh")
+    monkeypatch.setattr(gmsh.model.mesh, "generate", fail)
+    if smooth:
+        cell, key = case(tmp_path / "a.png", np.kron(np.eye(2), np.ones((9, 9))), smooth=True), "smooth = true"
+    else:
+        (tmp_path / "a.csv").write_text("x,y,radius,sides\n0.5,0.5,0.3,6\n")
+        cell, key = case_of({"geometry": "table", "file": "a.csv", "width": 1.0, "height": 1.0}, tmp_path), "fibres"
+    words = rf"^\[cell\] {key}: gmsh cannot fill the outlines \(no memory\); expected larger"
+    with pytest.raises(MeshError, match=words):
+        run(cell, MPI.COMM_SELF)
