@@ -21,7 +21,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
     assert cell.file is not None
     if cell.geometry == "mesh":
         snap = cell.snap_tolerance if cell.repair == "snap" else None
-        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials)
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials, cell.order)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh

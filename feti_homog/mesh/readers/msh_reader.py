@@ -43,6 +43,7 @@ def read(
     has_voids: bool = False,
     boundary: str = "periodic",
     materials: Collection[str] = (),
+    order: int = 2,
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
@@ -52,7 +53,7 @@ def read(
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
     numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
-    relative to the width, nodes first move onto sides (`snapped`).
+    relative to the width, nodes first move onto sides (`snapped`). A remark tells of a lower `order` in the case.
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
@@ -70,7 +71,8 @@ def read(
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
     mesh = made(raw, path.name, has_voids, boundary)
-    remarks = (*mesh_checks.unused_curves(raw), *mesh.remarks)
+    linear = ["[cell] order = 1: linear elements, though those of the file are quadratic: order = 2 keeps them so"]
+    remarks = (*mesh_checks.unused_curves(raw), *linear * (order == 1 < len(raw.middles.tags)), *mesh.remarks)
     return replace(mesh, snapped=moved, remarks=tuple(escaped(f"{path.name}: {remark}") for remark in remarks))
 
 
