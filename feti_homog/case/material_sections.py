@@ -45,9 +45,8 @@ def read_materials(
         return {}
     table = document["material"]
     if not isinstance(table, dict):
-        reader.faults.append(
-            f"material = {wording.toml_value(table)}: expected sections [material.matrix], [material.fibre]"
-        )
+        expected = "expected sections [material.matrix], [material.fibre]"
+        reader.faults.append(f"material = {wording.toml_value(table)}: {expected}")
         return {}
     geometry = reader.selected[GEOMETRY]
     fibres = fibre_phases(document.get("cell")) if geometry in CIRCULAR else None

@@ -174,7 +174,8 @@ def process_zone(case: Case) -> tuple[float, float]:
     pairs = [(toughness / strength**2, strength) for toughness, strength in pure if toughness and strength]
     limit = 100.0 * min((strength for _, strength in pairs), default=math.inf)
     length, strength = min((pair for pair in pairs if pair[1] < limit), default=(math.inf, math.inf))
-    return min(_modulus(case, phase) for phase in case.materials) * length, strength
+    # Conductors have no modulus.
+    return min((_modulus(case, phase) for phase in case.materials if pairs), default=1.0) * length, strength
 
 
 def _modulus(case: Case, phase: str) -> float:

@@ -94,6 +94,12 @@ def test_the_warning_replaces_an_accuracy():
     assert warnings(case_of(mesh_size=float(size), refine=int(refine), interface_size=float(interface_size))) == []
 
 
+def test_conductors_have_no_such_length():
+    document = {"cell": CELL, "analysis": {"type": "conductivity"}, "interface": {"conductance": 1.0}}
+    document["material"] = {phase: {"conductivity": 1.0} for phase in ("matrix", "fibre")}
+    assert warnings(cases.parse(document, Path())) == []
+
+
 def test_other_bonds_have_no_such_length():
     assert (
         cell_remarks.process_zone(case_of(criterion="max")) == (np.inf, np.inf)
