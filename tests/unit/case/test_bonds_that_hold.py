@@ -1,5 +1,7 @@
 """A debonded arc on a fibre with strong bonds, beside fibres with a cohesive law."""
 
+import itertools
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -78,6 +80,15 @@ def test_unlimited_strengths_hold_as_rigid_bonds_do(tmp_path):
 def test_unlimited_strengths_have_no_other_constants(change, words):
     with pytest.raises(CaseError, match=words):
         case_of(UNLIMITED | {"teeth": 1} | change)
+
+
+def test_bonds_that_hold_are_no_strengths_in_another_unit():
+    numbers = {"strength": 5e4, "toughness": 1e3}
+    wrong = GLASS | {f"{mode}_{name}": numbers[name] for mode in ("normal", "tangential") for name in numbers}
+    for glass, count in ((GLASS, 0), (wrong, 2)):
+        for sections in itertools.permutations([glass, UNLIMITED | {"teeth": 1}]):
+            document = case_of(GLASS | ARC).resolved() | {"interface": list(sections)}
+            assert len(Case.parse(document).warnings()) == count
 
 
 def test_bonds_hold_only_beside_bonds_that_break():
