@@ -227,8 +227,7 @@ def _bonds() -> Iterator[Rule]:
         holds = partial(lambda rule, table: rule.holds(table) or never_break(table), rule)
         yield replace(rule, holds=holds, words=partial(law.missing, name), when=when)
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
-    line = f"[interface]: missing section; {type_} needs it"
-    yield needed((), "interface", line, kinds.ENVELOPE_ANALYSIS)
+    yield needed((), "interface", f"[interface]: missing section; {type_} needs it", kinds.ENVELOPE_ANALYSIS)
     for plane, names in ((kinds.IN_THE_PLANE, STRENGTHS[:2]), (kinds.GENERALIZED, STRENGTHS)):
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         yield Rule((), partial(_any_section, partial(_breaks, names)), line, (kinds.ENVELOPE_ANALYSIS, plane))
@@ -237,7 +236,8 @@ def _bonds() -> Iterator[Rule]:
         tables = [table for table in interface_tables(document) if isinstance(table, dict)]
         return all(table.get("contact") is False for table in tables) or not any(map(_some_arc, tables))
 
-    line = f"expected false with debonded arcs; {type_} superposes loads, which contact forbids"
+    way = 'which contact forbids: type = "path" finds the onset of one load'
+    line = f"expected false with debonded arcs; {type_} superposes loads, {way}"
     yield Rule((), touches_nowhere, f"[interface] contact: {line}", (kinds.ENVELOPE_ANALYSIS,))
 
 
