@@ -58,11 +58,9 @@ def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:
-        row, column = rows - solid[k] // columns, solid[k] % columns + 1
-        where = f"the part of {sizes[part[k]]} pixels around row {row}, column {column}"
-        faults.append(
-            f"floating parts, separated from all others by voids: {where}; expected the label of a void there"
-        )
+        where = f"{sizes[part[k]]} pixels around row {rows - solid[k] // columns}, column {solid[k] % columns + 1}"
+        line = "floating parts, separated from all others by voids: the part of"
+        faults.append(f"{line} {where}; expected the label of a void there")
     if mesh.boundary == "traction" and not (is_solid[[0, -1]].all() and is_solid[:, [0, -1]].all()):
         faults.append('voids at the sides, where boundary = "traction" has no material to pull at')
     return faults

@@ -66,7 +66,7 @@ def read(
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
         raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
-    unknown = unknown_phases(raw, known_names(loaded), phases or {}, materials)
+    unknown = unknown_phases(raw, known_names(loaded), phases or {}, sorted(materials, key=phase_names.COATING.__eq__))
     _refuse(path.name, mesh_checks.unlabelled(raw), unknown, mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
@@ -253,12 +253,14 @@ def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Co
     usual = ("matrix", *materials, "fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1)))
     mixed = any("fib" not in name.casefold() for name in shares)  # numbers of an array are called fibre, fibre:2, ...
     order = sorted(shares, key=lambda k: (mixed and k in materials, mixed and "fib" in k.casefold(), -shares[k]))
-    others = [name for name in order if name != "matrix" and name not in phases]
+    others = sorted({*order} - {"matrix", *phases}, key=lambda k: (k.casefold() != "matrix", order.index(k)))
     first = others[: not has_matrix]
     if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
-        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *phases, phase_names.COATING)]
         entries = {name: wording.toml_value([*some] if some[1:] else some[0]) for name, some in phases.items()}
-        entries |= dict(zip(targets, map(_as_selected, renamed), strict=False))
+        alike = {k: k.casefold() for k in renamed if k.casefold() in {*usual} - {*names, *entries}}
+        entries |= {name: _as_selected(k) for k, name in alike.items()}
+        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *entries)]
+        entries |= dict(zip(targets, (_as_selected(k) for k in renamed if k not in alike), strict=False))
         written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in entries.items())
         condition = f"If {_as_selected(first[0])} is the matrix" if first else "If these are fibres"
         condition += ", set in" if phases else ", add to"
