@@ -54,7 +54,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if not context.plane.interface.is_linear(bonds.status):
         raise CaseError(
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
-            "superposes loads, which contact forbids"
+            'superposes loads, which contact forbids: type = "path" finds the onset of one load'
         )
     columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
     errors, responses = response_errors(context, context.loads.by_problem(responses))

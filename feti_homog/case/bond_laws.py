@@ -41,7 +41,7 @@ class BondLawEntry:
         if (normal := name.replace("tangential", "normal")) != name:
             return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
         if name == COHESIVE[0] and "between" in table:
-            return f"{fault}; bonds that hold have 100 times the strengths and 1e4 times the toughnesses of others"
+            return f"{fault}; bonds that hold have {' = inf, '.join(COHESIVE[:2])} = inf, and no other constants"
         hint = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
         return f"{fault}, such as {hint}" if name == STIFFNESSES[0] else fault
 

@@ -144,7 +144,8 @@ class Case:
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
         least = min(float(laws.stiffness_of(m, self.analysis.plane).max()) for m in self.materials.values())
-        tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in self.interfaces]
+        bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
+        tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in bonds]
         tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
         units = [f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are both in one unit?"
                  for section, table, end in tables for name, value in vars(table).items()

@@ -179,11 +179,8 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 def fractions_in_words(cell: Cell) -> str:
     """Write the fibre and void fractions of a cell without a file as keys."""
-    fibres = (
-        f"fibre_fraction = {cell.fibre_fraction:g}"
-        if cell.mix is None
-        else f"mix = {wording.toml_value(dict(cell.mix))}"
-    )
+    mix = "" if cell.mix is None else f"mix = {wording.toml_value(dict(cell.mix))}"
+    fibres = mix or f"fibre_fraction = {cell.fibre_fraction:g}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
@@ -228,10 +225,8 @@ def mix_faults(cell: Cell) -> list[str]:
     if fsum(cell.mix.values()) >= 1:
         faults.append(f"{given}: expected a sum below 1")
     if cell.radii is not None and set(cell.radii) != set(cell.mix):
-        expected = ", ".join(cell.mix)
-        faults.append(
-            f"[cell] radii = {wording.toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}"
-        )
+        expected = f"expected a radius of each of mix: {', '.join(cell.mix)}"
+        faults.append(f"[cell] radii = {wording.toml_value(dict(cell.radii))}: {expected}")
     if faults:
         return faults
     expected_counts = _expected_counts(cell)

@@ -127,7 +127,8 @@ class InterfaceSection:
     )
     normal_strength: float | None = strength_key(
         "R^n: normal traction at which a bond breaks; with a law that softens, N: normal traction at which its damage "
-        "begins. A force per area: it does not depend on the mesh."
+        "begins. A force per area: it does not depend on the mesh. With a law that softens, inf in both strengths "
+        "and no other constants: the bonds hold, with 1e4 times the normal constants of another [[interface]]."
     )
     tangential_strength: float | None = strength_key(
         "R^t: tangential traction at which a bond breaks; with a law that softens, S: traction in the plane and along "

@@ -45,9 +45,8 @@ def read_materials(
         return {}
     table = document["material"]
     if not isinstance(table, dict):
-        reader.faults.append(
-            f"material = {wording.toml_value(table)}: expected sections [material.matrix], [material.fibre]"
-        )
+        expected = "expected sections [material.matrix], [material.fibre]"
+        reader.faults.append(f"material = {wording.toml_value(table)}: {expected}")
         return {}
     geometry = reader.selected[GEOMETRY]
     fibres = fibre_phases(document.get("cell")) if geometry in CIRCULAR else None
@@ -84,9 +83,8 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     if has_coatings and phase_names.COATING not in materials:
         return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
     if not has_coatings and phase_names.COATING in materials:
-        return [
-            f"[material.{phase_names.COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"
-        ]
+        expected = "expected [cell] coating, or a column of a table"
+        return [f"[material.{phase_names.COATING}]: no fibre has a coating; {expected}"]
     return []
 
 

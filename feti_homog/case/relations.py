@@ -102,6 +102,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
             interfaces.append(replace(named, **_of_branch(named)))
     if len(interfaces) < len(tables):
         return None
+    interfaces = _held(interfaces)
     first: dict[frozenset[str], int] = {}
     for number, (label, interface) in enumerate(labelled(interfaces) if len(tables) > 1 else ()):
         if interface.between is None:
@@ -126,6 +127,16 @@ def _written(value: Any) -> str:
     """Format the value of a key on which all interfaces must agree, as in TOML; "none" for None."""
     table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
+
+
+def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
+    """Replace unlimited strengths under a cohesive law by 1e4 times the normal constants of bonds that break."""
+    names = (*STIFFNESSES, *COHESIVE)
+    breaking = next((bond for bond in interfaces if all(getattr(bond, name) for name in names)), None)
+    if breaking is None:
+        return interfaces
+    held = {name: 1e4 * getattr(breaking, name.replace("tangential", "normal")) for name in names}
+    return [bond if any(getattr(bond, name) for name in names) else replace(bond, **held) for bond in interfaces]
 
 
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:

@@ -126,9 +126,9 @@ def checked(
                 if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
                     continue
                 if fibre is not None and fibre not in fibres:
-                    phases = interface.between
-                    kind = "that can debond" if phases is None else f"between {' and '.join(phases)}"
-                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
+                    kind = f"between {' and '.join(interface.between)}" if interface.between else "that can debond"
+                    first = ", ".join(map(str, np.unique(fibres)[:3].tolist()))
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}; the first with one: {first}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = f"no node of {whose} is within the arc of {angle} degrees"

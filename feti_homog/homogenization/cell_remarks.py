@@ -132,10 +132,8 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
     fraction = cell.matched.fibre_fraction
-    remark = (
-        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; distances between "
-        "neighbours are the same in diameters"
-    )
+    remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"
+    remark += "; distances between neighbours are the same in diameters"
     return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
 
 
@@ -163,18 +161,24 @@ def longest(ends: Float) -> float:
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
-def process_zone(case: Case) -> float | None:
-    """Return the least process zone length E' G_Ic / sigma_c^2.
+def process_zone(case: Case) -> tuple[float, float]:
+    """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
-    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
+    Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
     are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
-    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.
+    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds with 100 times
+    the strengths of others hold, without a process zone.
     """
-    lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
+    pure = []
     for bond in case.interfaces:
-        pure = (bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)
-        lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
-    return min(_modulus(case, phase) for phase in case.materials) * min(lengths) if lengths else None
+        pure += [(bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)]
+        if bond.toughness and bond.normal_stiffness:
+            pure.append((bond.toughness, math.sqrt(2 * bond.normal_stiffness * bond.toughness)))
+    pairs = [(toughness / strength**2, strength) for toughness, strength in pure if toughness and strength]
+    limit = 100.0 * min((strength for _, strength in pairs), default=math.inf)
+    length, strength = min((pair for pair in pairs if pair[1] < limit), default=(math.inf, math.inf))
+    # Conductors have no modulus.
+    return min((_modulus(case, phase) for phase in case.materials if pairs), default=1.0) * length, strength
 
 
 def _modulus(case: Case, phase: str) -> float:
@@ -191,8 +195,8 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
         edge: longest coarse edge between phases, which `refine` halves.
         radii: radii of fibres, NaN unless round.
     """
-    length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
-    if length is None:
+    (length, strength), softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
+    if math.isinf(length):
         return lines
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
     ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
@@ -203,11 +207,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
     if not softens:
-        # The bonds of the shortest process zone break at this traction in pure opening.
-        pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
-        stiffness, toughness = max(pair for pair in pairs if all(pair))
-        strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
-        zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}"
+        zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength:.3g}"
     limit = f"elements should be at most {'a third' if softens else 'half'} as long"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.

@@ -60,7 +60,7 @@ class CoarseMesh:
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: largest move of a node in a user's mesh to make opposite sides match.
         origin: lower left corner of the cell in the coordinates of the user.
-        remarks: lines on differences from a fibre table, or on unused curves and nearly round polygons of a mesh file.
+        remarks: lines on fibre tables and fractions in images, on unused curves and nearly round polygons of a file.
         boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only periodic nodes have images.
         centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then
             the coatings in the same order.

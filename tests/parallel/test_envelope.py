@@ -269,5 +269,5 @@ def test_its_files_are_written_and_hold_what_they_say(comm, shared_path):
 
 def test_a_curve_of_the_mesh_that_may_close_is_refused(comm, shared_path):
     write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "strip.msh")
-    with pytest.raises(CaseError, match="contact: expected false with a debonded curve"):
+    with pytest.raises(CaseError, match=r"contact: expected false with a debonded curve.*: type = .path. finds"):
         envelope(comm, "strain", MAX, ["S11", "S12"], STRIP, shared_path, directions=4)

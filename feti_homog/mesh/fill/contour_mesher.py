@@ -6,7 +6,7 @@ The cell sides run through pixel centres. Contours cross opposite sides at equal
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
@@ -40,7 +40,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         raise CaseError('[cell] smooth = true: needs scikit-image: pip install "feti_homog[images]"') from None
     mask = _every_other(phase, phases)
     indicator = gaussian_filter(mask.astype(float), 1.0, mode="wrap")
-    level = float(np.quantile(indicator, 1.0 - mask.mean(), method="midpoint"))
+    # Pixels have few distinct values, so that more of them exceed a level than the area within its contour has.
+    quarters = zoom(indicator, 2, order=1, mode="grid-wrap", grid_mode=True)
+    level = float(np.quantile(quarters, 1.0 - mask.mean(), method="midpoint"))
     # The cell sides run where they cross contours most steeply.
     away = np.abs(indicator - level)
     across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
@@ -73,7 +75,10 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         content = filled(gmsh, size, field, "smooth = true", advice)
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
     place = i + 0.5 - width * (2 * i > width), j + 0.5 - rows * (2 * j > rows)
-    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]))
+    counts = zip(phases, np.bincount(phase.ravel()).tolist(), strict=True)
+    shares = ", ".join(f"{name} {count / phase.size:.6g}" for name, count in counts)
+    remark = f"[cell] smooth = true: fractions in the image: {shares}"
+    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]), remarks=(remark,))
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:

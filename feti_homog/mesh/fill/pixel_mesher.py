@@ -21,7 +21,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
     assert cell.file is not None
     if cell.geometry == "mesh":
         snap = cell.snap_tolerance if cell.repair == "snap" else None
-        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials)
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials, cell.order)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh
@@ -58,11 +58,9 @@ def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:
-        row, column = rows - solid[k] // columns, solid[k] % columns + 1
-        where = f"the part of {sizes[part[k]]} pixels around row {row}, column {column}"
-        faults.append(
-            f"floating parts, separated from all others by voids: {where}; expected the label of a void there"
-        )
+        where = f"{sizes[part[k]]} pixels around row {rows - solid[k] // columns}, column {solid[k] % columns + 1}"
+        line = "floating parts, separated from all others by voids: the part of"
+        faults.append(f"{line} {where}; expected the label of a void there")
     if mesh.boundary == "traction" and not (is_solid[[0, -1]].all() and is_solid[:, [0, -1]].all()):
         faults.append('voids at the sides, where boundary = "traction" has no material to pull at')
     return faults

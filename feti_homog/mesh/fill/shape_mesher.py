@@ -30,8 +30,6 @@ SAME_PLACE = 1e-6
 FEWEST_CELLS, MOST_CELLS = 32, 1000
 # Edge length on a coating / thickness; cosine between outline and side normals, above which they face each other.
 COATING_EDGE, FACING = 2.0, 0.9
-# Number of sources that contribute to the size at a position.
-NEAREST = 12
 # Smallest edge size / size of the cell.
 LEAST = 1e-5
 
@@ -172,4 +170,4 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
         length = np.where(faces, np.minimum(length, PASSAGE_EDGE * to_side), length)
     length = np.maximum(length, LEAST * size.max())
     growth = np.full(len(places), MAX_GROWTH)
-    return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)
+    return SizeField([(places, length, growth)], size, sizes.largest)

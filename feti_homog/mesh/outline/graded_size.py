@@ -127,18 +127,9 @@ class SizeField:
         least: lower bound of the sizes.
     """
 
-    def __init__(
-        self,
-        sources: Sequence[Source],
-        size: Float,
-        largest: float,
-        graded: FromLines | None = None,
-        nearest: int = NEAREST,
-        chunk: int = CHUNK,
-    ) -> None:
-        """Prepare sources on a torus of `size` (2,): `nearest` act at a point, and a query has `chunk` points."""
-        self.largest, self.graded = largest, graded
-        self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
+    def __init__(self, sources: Sequence[Source], size: Float, largest: float, graded: FromLines | None = None) -> None:
+        """Prepare sources on a torus with periods `size` (2,)."""
+        self.largest, self.graded, self._size, self._bound = largest, graded, size, largest / MAX_GROWTH
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         # For missing neighbours, the tree returns the number of sources, an index with infinite length.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
@@ -147,9 +138,9 @@ class SizeField:
 
     def __call__(self, points: Float) -> Float:
         """Return the sizes (n,) at points (n, 2)."""
-        wrapped, count, parts = wrap(points, self._size), min(self._nearest, self._tree.n), []
-        for k in range(0, max(1, len(points)), self._chunk):
-            some = wrapped[k : k + self._chunk]
+        wrapped, count, parts = wrap(points, self._size), min(NEAREST, self._tree.n), []
+        for k in range(0, max(1, len(points)), CHUNK):
+            some = wrapped[k : k + CHUNK]
             distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)
             sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
             parts.append(np.minimum(self.largest, sizes.min(axis=1)))

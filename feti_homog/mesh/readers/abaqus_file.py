@@ -159,6 +159,8 @@ class _Content:
         Raises MeshError if triangles, nodes of elements, or sets of sections are missing.
         """
         faults = [] if self.triangles else ["no triangles in it"]
+        if self.triangles and not self.sets:
+            faults = ["no element sets: expected one for each phase, such as *ELEMENT, TYPE=CPS3, ELSET=matrix"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
         faults += [f"element {tag}: there is no node {node}" for tag, node in islice(lost, 1)]

@@ -122,7 +122,7 @@ def load(path: Path) -> RawMesh:
     entries = NAME.findall(text)
     if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
         raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
-    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
+    names = {(int(d), int(number)): name.decode(errors="replace").strip() for d, number, name in entries}
     if len(names) < len(entries):
         raise MeshError("$PhysicalNames: one of the numbers has two names")
     return raw_mesh(replace(content, names=names))
@@ -134,7 +134,9 @@ def _sections(content: bytes) -> dict[str, bytes]:
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
     if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
-        raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
+        is_ansys = start.startswith(b"(")
+        cure = ', but like a file of Ansys: with meshio, write file_format = "gmsh22"' if is_ansys else ""
+        raise MeshError(f"not a gmsh mesh file: it does not begin with $MeshFormat{cure}")
     sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
     while place < end:
         header = SECTION.match(content, place)

@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int, Int32
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
 # The same distance, up to which coarser rounding may have made a polygon of a circle.
-NEARLY_ROUND = 1000 * ROUNDNESS_TOLERANCE
+NEARLY_ROUND = 1e4 * ROUNDNESS_TOLERANCE
 # Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
 # polygons.
 MIN_CIRCLE_EDGES = 8

@@ -12,6 +12,7 @@ from support.pixel_images import MATERIALS, case, quadrilaterals, random_image
 
 from feti_homog import Case, run
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh.fill import pixel_mesher
 from feti_homog.microstructure import label_image
 
 LABELS = {"0": "matrix", "1": "fibre"}
@@ -100,6 +101,21 @@ def test_smooth_outlines_have_the_constants_of_the_table(tmp_path):
     assert np.linalg.norm(away, axis=2).min(axis=0).max() < 0.5 / size
     pixels = run(case(tmp_path / "a.png", None, pixel=1 / size), MPI.COMM_SELF)
     assert np.abs(pixels.effective_stiffness - expected.effective_stiffness).max() < 3e-2 * scale
+
+
+def test_smooth_outlines_preserve_the_areas_of_the_image(tmp_path):
+    """Of small fibres, too, whose steps have few directions."""
+    rng = np.random.default_rng(1)
+    x, image = np.arange(120) + 0.5, np.zeros((120, 120), int)
+    for i, j in np.ndindex(6, 6):
+        a, b = 20 * np.array([i, j]) + rng.uniform(6, 14, 2)
+        image[(x - a) ** 2 + (x[:, None] - b) ** 2 < rng.uniform(4, 6) ** 2] = 1
+    mesh = pixel_mesher.read_cell(case(tmp_path / "a.npy", image, smooth=True, order=2, mesh_size=0.02).cell)
+    (remark,) = mesh.remarks
+    share = image.mean()
+    assert remark.endswith(f"smooth = true: fractions in the image: matrix {1 - share:.6g}, fibre {share:.6g}")
+    found = run(case(tmp_path / "a.npy", None, smooth=True, order=2, mesh_size=0.02), MPI.COMM_SELF)
+    assert found.cell.fibre_fraction == pytest.approx(share, rel=1e-2)
 
 
 def test_smooth_fibres_may_have_coatings_but_no_third_phase_beside_them(tmp_path):
