@@ -189,7 +189,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Condense the cell to `bonds`, and return their statuses (n,) and x (m,) at a strain (v,).  Collective.
+        """Condense the cell to `bonds`, and return face statuses (n,) and x (m,) at a strain (v,).  Collective.
 
         Without stored jumps all gaps and slips are zero.
         """
