@@ -200,7 +200,7 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """Parse arguments on all ranks; rank 0 alone prints.  Raises SystemExit as argparse does.  Collective."""
+    """Parse arguments on all ranks; only rank 0 prints.  Raises SystemExit as argparse does.  Collective."""
     printed = io.StringIO()
     try:
         with contextlib.ExitStack() as redirected:

@@ -171,7 +171,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would suffice if the energy error exceeds the case's `accuracy`, if any.  Collective."""
+    """Note which mesh suffices if `energy`, the relative energy error on rank 0, exceeds `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return

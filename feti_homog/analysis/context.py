@@ -29,8 +29,8 @@ class CellLoads:
     """The loads of a cell, and averages over the cell under each load.
 
     Attributes:
-        problems: the plane problem, in which faces may touch, and in generalized plane strain the axial problem; or
-            conduction alone.
+        problems: the plane problem, in which faces may touch, and in generalized plane strain the axial problem; in
+            conduction, only the conduction problem.
         interfaces: the interfaces, coupled in all problems.
         names: names of the unit loads of all problems.
     """

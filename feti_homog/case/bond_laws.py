@@ -51,7 +51,7 @@ STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 BRANCH = ("openings", "tractions")
-"""Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH to the law "table" alone."""
+"""Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH only to the law "table"."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (

@@ -60,7 +60,7 @@ CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
 # inclusions raise this error: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
-# Upper bound of kappa s in cells with mixed elements alone.
+# Upper bound of kappa s in cells with only mixed elements.
 MIXED_CONDITION = 33.0
 MOST_REFINED = 8
 

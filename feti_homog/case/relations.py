@@ -64,7 +64,7 @@ def axes_lines(
     """Return a remark, in generalized plane strain, on axes that users could take for ply axes; () without any."""
     if plane != voigt.GENERALIZED.name:
         return ()
-    from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
+    from feti_homog.materials import engineering_constants  # needed only in generalized plane strain
 
     loaded = [name for load in section.placed.values() for name, value in load_sections.named(load).items() if value]
     of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)

@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of all keys, or of entries that contain the given words.  Collective."""
+    """Print the reference of all keys, or of entries that contain the phrase `word`.  Collective."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 

@@ -150,7 +150,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; of 1 alone in order 1."""
+        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; only of 1 in order 1."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]

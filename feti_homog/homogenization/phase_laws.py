@@ -21,7 +21,7 @@ IN_PLANE, AXIAL_SHEAR, GRADIENT = [0, 1, 5, 2], [4, 3], [4, 3, 2]
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, in generalized plane strain, the axial problem; or conduction alone.
+    """Return the plane problem and, in generalized plane strain, the axial problem; or only conduction.
 
     A temperature is a load of the plane problem if all phases have expansions.
     """

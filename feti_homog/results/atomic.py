@@ -1,4 +1,4 @@
-"""Write files that appear complete or not at all, even if the writer is killed; `append` alone extends a file in place.
+"""Write files that appear complete or not at all, even if the writer is killed; only `append` extends a file in place.
 
 The writer waits until both the content and the name of a file are on the disk.
 """

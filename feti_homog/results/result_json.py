@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document, with its checksum, for `loads`.  Values and their errors are as in `write`."""
+    """Write a document with its checksum as text for `loads`.  Values and their errors are as in `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:

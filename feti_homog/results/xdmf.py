@@ -48,7 +48,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets, by field name, of state fields with one of the `shapes`.  LISTED datasets are left out."""
+    """Return the datasets of state fields with one of the `shapes`, by field name, without LISTED datasets."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 

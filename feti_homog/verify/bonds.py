@@ -85,7 +85,7 @@ class BondLaw(ABC):
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return stiffnesses or strengths (`kind`), (c,) or (k, c): by default inf, axially the tangential one."""
+        """Return stiffnesses or strengths (`kind`), (c,) or (k, c): by default inf, axially the tangential value."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)

@@ -1,4 +1,4 @@
-"""Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
+"""Compute strains, stresses and forces of triangles with three or six nodes, only for the certificate.
 
 Displacements have c = 2 components, or 3 in generalized plane strain and conduction; strains and stresses have v = 3 or
 6, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a =

@@ -177,7 +177,7 @@ class ExactInverse(Preconditioner):
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
         """Select rows without columns: the global `rows` (k,), and active rows nearby up to a full batch.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  Inactive rows alone get no neighbours.
+        Neighbours of broken bonds break next, and columns are cheaper together.  If all are inactive, none is added.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0

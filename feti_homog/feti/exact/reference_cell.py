@@ -231,7 +231,7 @@ class ReferenceCell:
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
 
-    Then columns of Gamma need forces of the moved bodies alone.  The inner body moves, unless its forces would lose
+    Then columns of Gamma need only forces of the moved bodies.  The inner body moves, unless its forces would lose
     digits because it is more than STIFF_FIBRES times as stiff as the outer body.
     """
     comm, jump_operator = operators.comm, operators.jump_operator

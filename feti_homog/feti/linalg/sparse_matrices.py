@@ -183,7 +183,7 @@ class DistributedSolver:
             self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
             matrix.scale(self._scale)
             library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
-            # The vectors need all ranks; the factorization may fail on one rank alone.
+            # The vectors need all ranks; the factorization may fail on only one rank.
             self._x, self._b = matrix.createVecs()
             if near_kernel is not None:
                 # A basis (n, m), without zero columns and equal on all ranks.

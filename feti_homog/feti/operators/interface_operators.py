@@ -140,8 +140,8 @@ class InterfaceOperators:
         """Factor every local subdomain as `choose` decides, without communication.
 
         `kind`, `applications` and `soft_modes` are as in `choose`.  `compliance` (local rows,) of the springs is None
-        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps on one
-        rank alone, if rounding leaves the stiffness of a subdomain without a factor.
+        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps only on
+        one rank, if rounding leaves the stiffness of a subdomain without a factor.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = max([len(jump_operator.problem.loads), *(s.Q.shape[1] for s in subdomains)])
@@ -194,7 +194,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, in the inner body alone."""
+        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, only in the inner body."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -209,7 +209,7 @@ class InterfaceOperators:
         return self._each([o.apply_schur for o in self.operators], x)
 
     def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
-        """Compute S~ x, with the stiffness S~ of bodies with springs, for x (n,) or (n, k).
+        """Compute S~ x for x (n,) or (n, k), with the stiffness S~ of bodies with springs.
 
         `which` (subdomains,) selects subdomains; the result is 0 on all other subdomains.
         """

@@ -116,7 +116,7 @@ class ContactProblem:
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """Return normal and tangential traction (k, 2), tension positive; in the axial problem the axial one (k, 1)."""
+        """Return tractions, tension positive: normal and tangential (k, 2), or axial (k, 1) in the axial problem."""
         return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:

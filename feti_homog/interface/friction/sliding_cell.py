@@ -189,7 +189,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Condense the cell to `bonds`, and return their statuses (n,) and x (m,) at a strain (v,).  Collective.
+        """Condense the cell to `bonds`, and return face statuses (n,) and x (m,) at a strain (v,).  Collective.
 
         Without stored jumps all gaps and slips are zero.
         """
@@ -203,7 +203,7 @@ class SlidingCell:
         return status, np.concatenate([table[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
-        """Return this rank's bonds with the statuses (n,) and the jumps in x."""
+        """Return this rank's bonds with face statuses (n,) and the jumps in x; damaged bonds stay BONDED."""
         face, jump = status[self._position], np.zeros((len(before.status), 2))
         jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)

@@ -55,14 +55,14 @@ class CoulombLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """The equilibrium at s, computed once.  Collective."""
+        """The equilibrium at leg fraction s, computed once.  Collective."""
         if self._state is None:
             loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
             self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
         return self._state
 
     def _path_state(self) -> PathState:
-        """Return the path state at s, with the spring energy of damaged bonds.  Collective."""
+        """Return the path state at leg fraction s, with the spring energy of damaged bonds.  Collective."""
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:

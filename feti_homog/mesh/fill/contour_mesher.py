@@ -98,7 +98,7 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
-    """Return the field of edge sizes, in cell widths, for `curves` of points (k, 2), in pixels.
+    """Return the field of edge sizes in cell widths for `curves` of points (k, 2) in pixels.
 
     A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number, unless
     the edges would be shorter than a pixel. Edges are shorter in narrow passages, between points with opposite

@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k), at `offsets` (n, k, 2) from centres, to the nearest of POINTS outline points."""
+        """Return distances (n, k) of places at `offsets` (n, k, 2) from centres to the nearest of POINTS points."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]

@@ -81,7 +81,7 @@ def draw(
 def of_fields(
     directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | str | None = None
 ) -> Iterator[Picture]:
-    """Yield the pictures of mesh and fields, or of the `chosen` state alone.
+    """Yield the pictures of mesh and fields, or only of the `chosen` state.
 
     Raises CaseError if the result has no such state or component.
     """

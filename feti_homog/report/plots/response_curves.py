@@ -24,7 +24,7 @@ FAINTEST = 0.005  # smaller entries have no number
 
 
 def drawn(document: Document) -> Mapping[str, Curve]:
-    """Return the functions that draw the pictures of result.json alone, by picture name."""
+    """Return the functions that draw pictures from result.json only, by picture name."""
     curves, name = dict[str, Curve](sensitivities=sensitivities, energy=path_picture.energies), reported(document).name
     return curves | ({name: CURVES[name]} if name in CURVES else {})
 

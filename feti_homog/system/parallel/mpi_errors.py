@@ -87,7 +87,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """Call main() on every rank, and return its exit code.  Collective.
 
     If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints it, and its exit code is returned.
-    After any other exception, or a FetiHomogError on some ranks alone, the rank prints it and aborts the job.
+    After any other exception, or a FetiHomogError only on some ranks, the rank prints it and aborts the job.
     """
     try:
         return main()

@@ -116,7 +116,7 @@ def _is_place(text: str) -> bool:
 
 
 def _words_of(file: str) -> list[str]:
-    """Return the words of an options file; [] if it is unreadable, or does not contain PETSc's options alone."""
+    """Return the words of an options file; [] unless it is readable and contains only PETSc's options."""
     try:
         lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
     except (OSError, ValueError):  # ValueError: the name has a null character

@@ -38,7 +38,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
         in_database = given_options()
         if faults := faults_of_solvers(in_database):
             raise CaseError(*faults)
-        # Some options are read by larger solvers alone: names unlike the names in the table wait for `refuse_unused`.
+        # Only larger solvers read some options: names unlike the names in the table wait for `refuse_unused`.
         _refuse_unread([name for name in in_database if table.almost_in_table(name) and not values.is_flag(name)])
         yield
     finally:
