@@ -134,8 +134,8 @@ def _sections(content: bytes) -> dict[str, bytes]:
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
     if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
-        is_ansys = start.startswith(b"(")
-        cure = ', but like a file of Ansys: with meshio, write file_format = "gmsh22"' if is_ansys else ""
+        ansys = ', but like a file of Ansys: with meshio, write with file_format = "gmsh22"'
+        cure = ansys if start.startswith(b"(") else ""
         raise MeshError(f"not a gmsh mesh file: it does not begin with $MeshFormat{cure}")
     sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
     while place < end:
