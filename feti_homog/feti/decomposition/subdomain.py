@@ -131,10 +131,10 @@ class Subdomain:
         return subdomain
 
     def mean_strain(self, dofs: Int) -> Float:
-        """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to the strain integral int eps*.
+        """Compute the weights w (k, m) of `dofs` (k,) in the integrals of the m displacement strains.
 
-        The integral covers the subdomain and its share of adjacent voids: int_Omega eps*, plus int u (x) n ds over the
-        boundaries of the voids, with n outward from the voids.
+        w^T u is the contribution of the displacements u to int eps over the subdomain, plus int u (x) n ds along its
+        edges at voids, with n outward from the voids: around a void, the sum is int eps over the void.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():

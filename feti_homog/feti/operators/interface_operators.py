@@ -99,7 +99,7 @@ class DualOperator:
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam (boundary dofs, k) for lam (owned rows, k), which Eq. (34) subtracts.  Collective."""
+        """Compute K+ B^T lam (boundary dofs, k), subtracted in Eq. (34), for lam (owned rows, k).  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
