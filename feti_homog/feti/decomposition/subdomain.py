@@ -25,8 +25,8 @@ class Subdomain:
         submesh: coarse mesh.
         mesh: refined mesh.
         problem: components of the displacement, and unit loads.
-        L: (v, v) stiffness of the material, see `assemble`; with several materials, the mean over the area.
-        laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
+        L: (v, v) stiffness of the material, see `assembly.assemble`; with several materials, the mean over the area.
+        laws, material: arguments of `assembly.assemble`; with one material, `laws` is (1, v, v) and `material` None.
         Q: (cn, v) unit loads, forces f = -Q E; with tractions t = Sigma n on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
         areas: (materials,) area of every material.
@@ -36,7 +36,7 @@ class Subdomain:
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
         is_outer: whether no other body lies around the body.
-        mixed: whether elements have a bubble and an internal pressure, see `assemble`.
+        mixed: whether elements have a bubble and an internal pressure, see `assembly.assemble`.
     """
 
     submesh: Submesh
@@ -70,7 +70,7 @@ class Subdomain:
     ) -> Subdomain:
         """Refine the submesh and assemble K and Q, without communication.
 
-        `laws`, `material` and `mixed` are as in `assemble`; `flags` are `is_thin` and `is_outer`.
+        `laws`, `material` and `mixed` are as in `assembly.assemble`; `flags` are `is_thin` and `is_outer`.
 
         Raises:
             MeshError: an element is inverted, or |K R| exceeds ZERO_TOLERANCE |K|.

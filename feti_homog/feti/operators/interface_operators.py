@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node has one other sharer, in another body.
-        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ (`with_springs`) is dense.
+        has_springs: whether the subdomain is an inner body with springs: its S~, see `with_springs.py`, is dense.
     """
 
     dofs: int
