@@ -162,7 +162,7 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for symmetric M (rows, rows)."""
+    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for P (n, m), R (n, k) and symmetric M."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)

@@ -24,7 +24,7 @@ class Subdomain:
     Attributes:
         submesh: coarse mesh.
         mesh: refined mesh.
-        problem: components of the displacement, and unit loads.
+        problem: the c displacements of a node, m displacement strains and v unit loads.
         L: (v, v) stiffness of the material, see `assembly.assemble`; with several materials, the mean over the area.
         laws, material: arguments of `assembly.assemble`; with one material, `laws` is (1, v, v) and `material` None.
         Q: (cn, v) unit loads, forces f = -Q E; with tractions t = Sigma n on the sides (cn, v + m), f = -Q [E, Sigma].
@@ -255,7 +255,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute an orthonormal kernel (cn, k): translations, and a turn if the body `rotates`; `held` nodes rest."""
+    """Compute an orthonormal kernel (cn, k) at n positions: translations, a turn if `rotates`; `held` nodes rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:
