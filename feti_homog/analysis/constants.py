@@ -117,9 +117,9 @@ def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
 def response_errors(
     context: AnalysisContext, groups: Sequence[Sequence[averaging.Response]]
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
-    """Estimate the mesh errors of the responses of each problem, in one group for each problem.  Collective.
+    """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
 
-    Also returns the responses with element errors.  The list of errors is empty if the case has `mesh_error = false`.
+    Returns the errors of each group, [] if `mesh_error = false`, and one list of all responses, with estimated shares.
     """
     if not context.case.output.mesh_error:
         return [], [*chain(*groups)]

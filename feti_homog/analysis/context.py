@@ -201,7 +201,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the debonding under the last plane response, and all iterations, by result.json names.  Collective."""
+        """Build result.json entries: debonding of the last plane response, and the sum of iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -72,7 +72,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
 
 
 def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
-    """Raise CaseError: `start`, and the keys or rank counts that differ from a stored case, except `skipped`."""
+    """Raise CaseError with the text `start` and the keys or ranks that differ from `stored`, except in `skipped`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
     before, now = (

@@ -61,7 +61,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a remark, in generalized plane strain, on axes that users could take for ply axes; () without any."""
+    """Return a remark on axes that may be taken for ply axes; () without such axes or generalized plane strain."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed only in generalized plane strain

@@ -246,7 +246,7 @@ class SectionTable:
 
     Attributes:
         section: section name.
-        place: position in the file, in words; for a material with its form.
+        place: position in the file as a text, such as "[load] to" or "[material.PHASE], FORM".
         contents: dataclass with the table keys.
     """
 

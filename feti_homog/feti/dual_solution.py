@@ -21,7 +21,7 @@ class DualSolution:
 
     Attributes:
         strain: (v,) load E: the macroscopic strain, then the other loads of the problem; with tractions on the sides
-            (v + m,), followed by the stress Sigma of the tractions.
+            (v + m,), followed by the m components of their stress Sigma.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.

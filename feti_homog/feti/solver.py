@@ -146,7 +146,7 @@ class FetiSolver:
     def stress_integral(self, solution: DualSolution) -> Float:
         """Compute the stress integral torn_stiffness E + d^T lam (v,) of a solution.  Collective.
 
-        With tractions on the sides, -int u* (x) n ds (m,) follows the stress integral.
+        With tractions on the sides, the entries -int u* (x) n ds (m,) come after the stress integral.
         """
         local = self.d.T @ solution.lam
         if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:

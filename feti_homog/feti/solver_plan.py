@@ -133,9 +133,10 @@ class SolverPlan:
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
     """Choose the preconditioner and the coarse space from sizes and options.
 
-    If all operators are dense, and no option requests the adaptive space, the default is influence columns for a thin
-    body, or for at least `influence_applications` products and at most `assembled_schur_dofs` shared dofs; else, if no
-    option requests a coarse space, BONDED for `one_each` and 1 to `dense_boundary_dofs` shared dofs; else "dirichlet".
+    With dense operators and no option for the adaptive space, the default is influence columns if a body is thin, or if
+    at least `influence_applications` products follow and at most `assembled_schur_dofs` dofs are shared.  Otherwise,
+    with dense operators and no option for a coarse space, the default is BONDED if `one_each` holds and 1 to
+    `dense_boundary_dofs` dofs are shared.  In all other cases it is "dirichlet".
     With "dirichlet", the coarse space is adaptive on request, or if bodies are cut and all subdomains are searchable.
 
     Raises:

@@ -88,7 +88,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
 
 def cut_off(mesh: CoarseMesh, refine: int) -> float:
-    """Return the fraction of round fibres that straight edges cut off after `refine` halvings; 0 without arcs."""
+    """Return the area fraction that straight edges cut off round fibres after `refine` halvings; 0 without arcs."""
     curves = mesh.ellipses[mesh.arc_circle]
     ends = np.linalg.solve(curves.frames, (mesh.points[mesh.arc_edges] - curves.centres[:, None]).swapaxes(1, 2))
     angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**refine

@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count the copies of each row (n, 3) in all meshes, and mark the first copy with 1: (n, 2).  Collective."""
+        """Count, for each part (n, 3), the copies of its rows, and mark first copies with 1: (n, 2).  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)

@@ -118,9 +118,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether the mesh error follows from a coarser mesh.  Collective.
 
-    Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with fibres other than
-    circles and ellipses or straight sides at voids, and for linear elements without interfaces.  For debonded responses
-    it is true only if the elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
+    Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with straight sides at
+    voids, with fibres other than circles and ellipses, and for linear elements without interfaces.  For debonded
+    responses it is true only if elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
     """
     lattice = cell.lattice
     pieces = (s.submesh for s in cell.subdomains)

@@ -172,7 +172,7 @@ class _Fields:
         """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V.
 
         At fixed displacements the derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with
-        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the other loads.
+        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the loads after the m strains.
         """
         (e, q, _, c, k), m = self.slopes.shape, problem.strains
         grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]

@@ -37,7 +37,7 @@ class UniformPart:
     Attributes:
         place: subdomain number on this rank.
         submesh, mesh: coarse triangles and refined mesh of the part.
-        dofs: (cn,) degrees of freedom of the part in the subdomain.
+        dofs: (k,) degrees of freedom of the part in the subdomain.
         L, problem: as in `Subdomain`.
         is_mixed: whether each element has a bubble and a pressure.
     """

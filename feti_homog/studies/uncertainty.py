@@ -172,7 +172,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 
 def is_study(values: Mapping[str, Any]) -> bool:
-    """Return whether a document has uncertain numbers, sound or faulty."""
+    """Return whether a document has a section [uncertainty] or uncertain numbers; both may be faulty."""
     document, faults = toml_files.to_document(values), list[str]()
     is_named = sections.UNCERTAINTY in document or bool(read_uncertainty(document, faults).std)
     return is_named or any(line.endswith(EXPECTED) for line in faults)

@@ -120,7 +120,7 @@ def solver_limit(rtol: float) -> float:
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
     """List the laws with their limits for a tolerance `rtol` of the dual problems, without violations.
 
-    Users' meshes, coatings, and the numbers `phases`, of `Elements.contrasts` and of `rounding`, widen the limits.
+    Users' meshes and coatings widen the limits, and so do `phases`: two `Elements.contrasts`, then two of `rounding`.
     """
     ratio, contrast, of_law, of_contrast = phases[0] / LARGE_RATIO, *phases[1:]
     # Factors by which nearly incompressible phases raise the limits.

@@ -148,7 +148,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Compute bounds (P) of the potential by a state `other`; infinite if its load has stresses of other components."""
+    """Bound the potential of `load` from below and above by the state `other`; infinite if `by_stress` differs."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)

@@ -52,7 +52,7 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Compute the soft modes, and factor the coarse problem.  Collective.
 
-        Soft modes have eigenvalues theta < `threshold` (`local_eigenproblems`).  Boundary operators must be dense where
+        Soft modes have theta < `threshold`, see module `local_eigenproblems`.  Boundary operators must be dense where
         `operators.facewise` is false.  Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
 
         Raises:

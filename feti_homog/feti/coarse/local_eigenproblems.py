@@ -110,10 +110,10 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute the soft face modes (n, m) with theta < `face_factor` x `threshold`.
+        """Compute the soft face modes (n, m) with theta < `Thresholds.face_factor` x `threshold`.
 
-        `shares` are the neighbours, with their parts of M^-1 on the common rows.  S+ extends a face mode to the whole
-        boundary; displacements below `decayed` times the largest are set to 0.
+        `shares` has the neighbours, with their parts of M^-1 on the common rows.  S+ extends a face mode to the whole
+        boundary; displacements below `Thresholds.decayed` times the largest are set to 0.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
@@ -162,7 +162,7 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for symmetric M (rows, rows)."""
+    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for P (n, m), R (n, k) and symmetric M."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)

@@ -108,9 +108,9 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2), which count as used.  Collective.
+        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
 
-        Both rows of a pair belong to one rank.  Raises ValueError if a row has no column.
+        Both rows of a pair belong to one rank; their columns count as used.  Raises ValueError if a row has no column.
         """
         if len(self.lacking(pairs)):
             raise ValueError("blocks of the response: expected rows with columns")

@@ -31,8 +31,8 @@ from feti_homog.typing import Float, Int
 class AssembledSchur:
     """The assembled Schur complement Z^T S Z of all subdomains; every rank has the whole factor.
 
-    S includes springs (`with_springs`).  Boundary displacements u = Z y have no jump on active rows, B Z = 0: all
-    copies of a node move together, but at inactive rows the copies of the inner body move independently.
+    S includes springs (`InterfaceOperators.with_springs`).  Boundary displacements u = Z y have no jump on active rows,
+    B Z = 0: all copies of a node move together, but at inactive rows the copies of the inner body move independently.
 
     Attributes:
         size: number of columns of Z, over all ranks.
@@ -94,7 +94,7 @@ class AssembledSchur:
 
 
 def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_matrix | Float:
-    """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs (`with_springs`).  Collective.
+    """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs, as in `AssembledSchur`.  Collective.
 
     The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
     `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.

@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node has one other sharer, in another body.
-        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ (`with_springs`) is dense.
+        has_springs: whether the subdomain is an inner body with springs: its S~, see `with_springs.py`, is dense.
     """
 
     dofs: int
@@ -99,7 +99,7 @@ class DualOperator:
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam (boundary dofs, k) for lam (owned rows, k), which Eq. (34) subtracts.  Collective."""
+        """Compute K+ B^T lam (boundary dofs, k), subtracted in Eq. (34), for lam (owned rows, k).  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:

@@ -43,13 +43,13 @@ class FaceSystem:
 
     Attributes:
         friction: (n,) mu.
-        S: (m, m) scaled stiffness, with 1 as the largest diagonal entry of each node.
-        size: (m,) units: the stiffness is S_ij size_i size_j.
-        nodes, loads: the number n of nodes, and the indices of the loads in x.
+        S: (m, m) scaled stiffness of x = (g, E), with 1 as the largest diagonal entry of each node.
+        size: (m,) units, m = 2n + v: the stiffness is S_ij size_i size_j.
+        nodes, loads: the number n of nodes, and the indices of the v loads E in x.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """Scale the stiffness (m, m) of n normal and n tangential jumps and v loads: m = 2n + v."""
+        """Scale the stiffness (m, m) of n pairs of jumps (normal, tangential), then v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction, self.nodes, self.loads = friction, n, slice(2 * n, len(stiffness))
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)

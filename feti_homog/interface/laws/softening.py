@@ -182,7 +182,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _damages(self) -> Float:
-        """The damage levels (n + 1,)."""
+        """The damage levels (n + 1,) at the ends of n teeth."""
         return np.array(self.levels)
 
     @property

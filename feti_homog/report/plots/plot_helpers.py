@@ -169,9 +169,9 @@ def draw_segments(
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
     """Choose the colour range and the colour map of a stress.
 
-    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
-    zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
-    default: meshes are fine at tips, where stresses are singular.  Returns range, map, and ends like `value_range`.
+    Zero is white, tension red and pressure blue in all pictures.  The range is the `value_range` of values (n,) or
+    (states, n), or symmetric about zero if tension and pressure are similar.  Without `areas` (n,), the many small
+    elements at tips, where stresses are singular, widen the range.  Returns range, map, and ends like `value_range`.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)

@@ -165,8 +165,8 @@ class Coordinate:
 def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     """Return the coordinate of the interface nodes along a body outline.
 
-    On round fibres and their coatings the coordinate is the normal direction (degrees).  On other bodies it is the arc
-    length, counterclockwise from the node whose normal is nearest to x1; several boundaries follow each other.
+    It is the normal direction (degrees) on round fibres and their coatings.  On other bodies it is the arc length,
+    counterclockwise from the node whose normal is nearest to x1, or from an open end; boundaries follow each other.
     """
     file, edges = cell.file, cell.interface.nodes
     of_body = np.flatnonzero(file["interface/fibre"][:] == body)

@@ -209,7 +209,7 @@ def _number(count: int, name: str) -> str:
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return tables of stresses and utilisations of the phases; [] without stresses.  Curves show only some points."""
+    """Return tables of phase stresses and utilisations, at some points of a curve; [] without stresses."""
     phases = document.get("phase_stresses", ())
     if not phases:
         return []
