@@ -110,10 +110,11 @@ def _read_material(
         way = laws.OF_DATA_SHEETS if "orthotropic" in forms else "a material is of one kind"
         reader.faults.append(f"[{section}] {groups}: exclude each other; {way}")
         return None
-    material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
-    if material is None and "orthotropic" in forms and ": missing" in reader.faults[-1]:
-        reader.faults[-1] += f"; {laws.OF_DATA_SHEETS}"
-    elif material is not None:
+    kind = material_forms.MATERIAL_FORMS[forms[0]]
+    material: material_forms.Material | None = reader.read(kind, table, section)
+    missing = laws.missing_constants(kind, names, plane) if plane and plane != voigt.CONDUCTION.name else []
+    reader.faults += [f"[{section}] {fault}" for fault in missing]
+    if material is not None and not missing:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
         if material.strength is not None and plane != voigt.CONDUCTION.name:
             checks += [lambda m: material_forms.criterion(m.strength), partial(_known_stress, plane=plane)]

@@ -231,8 +231,7 @@ def _bonds() -> Iterator[Rule]:
             rule = needed(INTERFACE, name, "", kinds.BREAKING, kinds.CRITERION.among(law.name))
             yield replace(rule, words=partial(law.missing, name))
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
-    line = f"[interface]: missing section; {type_} needs it"
-    yield needed((), "interface", line, kinds.ENVELOPE_ANALYSIS)
+    yield needed((), "interface", f"[interface]: missing section; {type_} needs it", kinds.ENVELOPE_ANALYSIS)
     for plane, names in ((kinds.IN_THE_PLANE, STRENGTHS[:2]), (kinds.GENERALIZED, STRENGTHS)):
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         yield Rule((), partial(_any_section, partial(_breaks, names)), line, (kinds.ENVELOPE_ANALYSIS, plane))
