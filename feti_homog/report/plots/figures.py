@@ -72,7 +72,7 @@ def of_fields(
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
     name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
     if name and any(name not in state or np.isnan(state[name][:]).any() for state in states.values()):
-        names = "S11, S22 or S12, and S33 or von_mises where the constants of all phases give S33"
+        names = "S11, S22 or S12, and S33, von_mises or principal where the constants of all phases give S33"
         raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
 
     def save(figure: Figure, name: str) -> Path:
