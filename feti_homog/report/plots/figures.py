@@ -71,8 +71,10 @@ def of_fields(
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
     name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
-    if name and any(name not in state or np.isnan(state[name][:]).any() for state in states.values()):
+    conducts = report.name == "conductivity"
+    if name and (conducts or any(name not in state or np.isnan(state[name][:]).any() for state in states.values())):
         names = "S11, S22 or S12, and S33, von_mises or principal where the constants of all phases give S33"
+        names = "none; its pictures show the flux along the gradient" if conducts else names
         raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
 
     def save(figure: Figure, name: str) -> Path:
@@ -97,7 +99,7 @@ def of_fields(
         if report.is_followed and look == plot_helpers.PLAIN:
             paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
     for number, state in {} if report.is_curve else states.items():
-        strain, conducts = state.attrs["strain"], report.name == "conductivity"
+        strain = state.attrs["strain"]
         if conducts and strain[2]:  # along the fibres the gradient is uniform
             continue
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
@@ -108,7 +110,7 @@ def of_fields(
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
         paths.append(save(cell_picture.deformed(cell, state, document, look), report.picture or name))
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
-    if (broken and report.name != "conductivity") or (report.is_followed and states):
+    if (broken and not conducts) or (report.is_followed and states):
         from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
         paths.append(save(traction_plots.figure(cell, document, look), "interface"))

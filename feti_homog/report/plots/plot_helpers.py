@@ -250,8 +250,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     if component in DERIVED:  # by element means, as in `viewed_states`
         shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
         parts = state["stress"][:], table[:], shears
-        is_principal = component == "principal"
-        table = voigt.spatial_principal(*parts)[:, 0] if is_principal else voigt.spatial_von_mises(*parts)
+        table = voigt.spatial_von_mises(*parts) if component == "von_mises" else voigt.spatial_principal(*parts)[:, 0]
     return node_means(triangle_means(table, column, drawn), drawn)
 
 
