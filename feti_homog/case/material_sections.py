@@ -1,7 +1,6 @@
 """Read the [material.PHASE] sections, and find the material of each mesh phase."""
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -133,17 +132,17 @@ def _known_stress(material: material_forms.Material, plane: str | None) -> None:
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")
 
 
-def missing_expansions(materials: Mapping[str, material_forms.Material], needed_by: str) -> list[str]:
-    """List materials without the thermal expansion that the key `needed_by` requires.
+def missing_expansions(tables: object, needed_by: str) -> list[str]:
+    """List material tables without the thermal expansion that the key `needed_by` requires.
 
-    Materials with other faults are skipped: `read_materials` reports them.
+    Tables with unknown keys, which may be misspelt expansions, are skipped.
     """
     faults, pair = [], f"{', '.join(material_forms.EXPANSION_PAIR)}, or one expansion"
-    for phase, material in materials.items():
-        name = pair if isinstance(material, material_forms.TransverselyIsotropic) else "expansion"
-        with suppress(ValueError):
-            if laws.expansion(material) is None:
-                faults.append(f"[material.{wording.toml_key(phase)}] {name}: missing; {needed_by} needs it")
+    for phase, table in tables.items() if isinstance(tables, dict) else ():
+        names = table.keys() if isinstance(table, dict) else {"expansion"}
+        if names <= FORMS_OF.keys() and not {"expansion", *material_forms.EXPANSION_PAIR} & names:
+            name = pair if {"E_axial", "E_transverse"} & names else "expansion"
+            faults.append(f"[material.{wording.toml_key(phase)}] {name}: missing; {needed_by} needs it")
     return faults
 
 
