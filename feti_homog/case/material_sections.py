@@ -95,10 +95,11 @@ def _read_material(
     """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
     names, given = [*table] if isinstance(table, dict) else [], dict[str, list[str]]()
     sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
-    if not sheet.keys() <= FORMS_OF.keys():
+    if isinstance(table, dict) and not sheet.keys() <= FORMS_OF.keys():
         axes = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
         reader.faults.append(f"[{section}] {axes}: give {', '.join(sheet.values())}")
-        return None
+        table = {sheet.get(name, name): value for name, value in table.items()}  # for its other faults
+        names = [*table]
     for name, (form, *further) in FORMS_OF.items():
         if name in names and not further:
             given.setdefault(form, []).append(name)
