@@ -233,13 +233,13 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
-    """Print the summary on rank 0, without warnings and faults.  Collective.
+    """Print the summary on rank 0, without faults.  Collective.
 
-    Warnings were printed before; the error that follows states the faults.  Other ranks load no tables.
+    The error that follows states the faults.  Other ranks load no tables.
     """
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary
 
-        printed = replace(result, timings=timings, warnings=(), faults=())
+        printed = replace(result, timings=timings, faults=())
         progress.say(f"\n{summary.summary(printed.document)}")

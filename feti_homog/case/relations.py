@@ -51,7 +51,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     if envelope is not None and envelope.temperature is not None:
         heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:
-        faults += missing_expansions(sections["materials"], heated[0])
+        faults += missing_expansions(document.get("material"), heated[0])
     faults += coating_faults(sections["cell"], document.get("material"))
     if angle is not None and angle.strain is not None and not any(angle.strain):
         faults.append("[angle] strain: expected a strain other than zero")

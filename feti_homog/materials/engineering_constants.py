@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from feti_homog.materials.laws import COUPLINGS, ISOTROPY
 from feti_homog.materials.material_forms import PER_TEMPERATURE
-from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
+from feti_homog.materials.voigt import EXPANSIONS, IN_PLANE_BLOCK, THERMAL_STRESSES
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
@@ -132,9 +132,7 @@ def about_fibres(C: Array) -> dict[str, Any]:
     beside m.  The moduli are equal in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
     G_transverse = m, K_transverse = k (Hill 1964).
     """
-    off = C[0, 1] + C[1, 0]
-    k = (C[0, 0] + C[1, 1] + off) / 4
-    m = (C[0, 0] + C[1, 1] - off + 4 * C[5, 5]) / 8
+    k, m = isotropic_part(C[IN_PLANE_BLOCK])
     across = (C[0, 2] + C[1, 2] + C[2, 0] + C[2, 1]) / 4
     E, nu = C[2, 2] - across**2 / k, across / (2 * k)
     E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
@@ -158,16 +156,15 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
     return Moduli(**{name: float(value) for name, value in table.items()}, anisotropy=anisotropy(C))
 
 
-def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return the bulk modulus k and the shear modulus mu of the nearest isotropic stiffness.
+def isotropic_part(stiffness: ArrayLike) -> tuple[Any, Any]:
+    """Return the moduli k and mu of the nearest isotropic stiffness, of a real or complex one.
 
     k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8 for a plane stiffness C (3, 3), nearest in the
     Frobenius norm of tensors.  Turns of the axes change neither.
     """
-    c = np.asarray(stiffness, dtype=float)
-    bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
-    shear = (c[0, 0] + c[1, 1] - c[0, 1] - c[1, 0] + 4 * c[2, 2]) / 8
-    return float(bulk), float(shear)
+    c = np.asarray(stiffness)
+    off = c[0, 1] + c[1, 0]
+    return (c[0, 0] + c[1, 1] + off) / 4, (c[0, 0] + c[1, 1] - off + 4 * c[2, 2]) / 8
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:

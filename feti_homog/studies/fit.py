@@ -111,8 +111,9 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            teeth = next((bond.teeth for bond in self.first_cases().cases[0].interfaces if bond.teeth), 0)
-            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates, teeth)}
+            tables, keys = interface_section.interface_tables(self.document), ("teeth", "softening_tolerance")
+            steps = next((f"{key} = {table[key]:g}" for table in tables for key in keys if key in table), "")
+            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates, steps)}
             rows = [[datum[name] for name in estimation.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([estimation.HEAD, *rows]))
             pictures.draw_fit(evaluator.directory / "fit.png", document, evaluations.answers[_rounded(estimates.x)])

@@ -92,7 +92,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     elif any(value * end < 0 for value in values):
         yield f"expected strains of the sign of the path, which ends at {end:g}"
     elif is_strain and (largest := max(map(abs, values))) > abs(end) * (1 + path_curves.SAME_LOAD):
-        hint = "; in per cent?" if 50.0 <= largest / abs(end) <= 200.0 else ""
+        hint = "; in per cent?" if 5.0 <= largest / abs(end) <= 200.0 else ""
         yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}{hint}"
 
 

@@ -89,8 +89,10 @@ def of_fields(
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
     name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
-    if name and any(name not in state or np.isnan(state[name][:]).any() for state in states.values()):
-        names = "S11, S22 or S12, and S33 or von_mises where the constants of all phases give S33"
+    conducts = report.name == "conductivity"
+    if name and (conducts or any(name not in state or np.isnan(state[name][:]).any() for state in states.values())):
+        names = "S11, S22 or S12, and S33, von_mises or principal where the constants of all phases give S33"
+        names = "none; its pictures show the flux along the gradient" if conducts else names
         raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
     if chosen is not None:
         marks = {n: mark.split(" and ") for n, mark in landmarks.marks(document).items()} if report.is_followed else {}
@@ -112,7 +114,7 @@ def of_fields(
         if report.is_followed and look == plot_helpers.PLAIN:
             yield "path", lambda: deformed_panels.animation(file, document, scale, directory / "path.gif")
     for number, state in {} if report.is_curve else states.items():
-        strain, conducts = state.attrs["strain"], report.name == "conductivity"
+        strain = state.attrs["strain"]
         if conducts and strain[2]:  # along the fibres the gradient is uniform
             continue
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
@@ -124,7 +126,7 @@ def of_fields(
         of_state = partial(lambda state: cell_picture.deformed(cell(), state, document, look), state)
         yield report.picture or name, of_state
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
-    if (broken and report.name != "conductivity") or (report.is_followed and states):
+    if (broken and not conducts) or (report.is_followed and states):
         from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
         yield "interface", lambda: traction_plots.figure(cell(), document, look)
