@@ -1,4 +1,4 @@
-"""FETI-based homogenization of fibre composites; see the README.  Its import starts neither MPI nor PETSc.
+"""Homogenize fibre composites by FETI; see the README.  The import of this package starts neither MPI nor PETSc.
 
 In your own program, under `mpirun` or not:
 
@@ -15,7 +15,7 @@ In your own program, under `mpirun` or not:
 - `run_fit`: constants of cases from measured values.
 - `draw_state`: draw the deformed cell in a state into Matplotlib's axes.  `read_state`: fields of a state as arrays.
 - `launch`: run a program with its own and PETSc's options; errors end it as on the command line.
-- `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks; `faults` are lines.
+- `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks; `faults`: lines.
 """
 
 import importlib

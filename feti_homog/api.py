@@ -37,8 +37,8 @@ def run(
 ) -> result.Result:
     """Run a case on the ranks of `comm`, by default all ranks.
 
-    Collective over `comm`; other ranks need not take part.  Unless PETSc already runs, it starts with only
-    PETSC_OPTIONS; the section `petsc` of the case has the case options.  Returns the result on every rank.
+    Collective over `comm`; other ranks need not take part.  Unless PETSc already runs, it starts with the options in
+    PETSC_OPTIONS; the options in the section `petsc` hold during this run.  Returns the result on every rank.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
@@ -48,7 +48,7 @@ def run(
 
     Raises:
         TypeError: `case` is not a Case, or `comm` is not an intracommunicator.
-        CaseError, MeshError: the case cannot be run, or `out` cannot be used.
+        CaseError, MeshError: the case cannot be run, PETSC_OPTIONS is faulty, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; the computed part is in `out`.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
         FetiHomogError: a file cannot be written, MPI has ended, or another thread is in a call of this module.
@@ -72,7 +72,7 @@ def run_sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> sweep_table.SweepTable:
-    """Run the sweep cases, given as a file or document.  Collective.
+    """Run the cases of a sweep, given as a file or document.  Collective.
 
     Returns the table of the cases on every rank.  The same call resumes an interrupted sweep in `out`.
 
@@ -96,9 +96,9 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and, with `pictures`, a picture; return lines to print.  Collective over `comm`.
+    """Write cases.csv, statistics.csv and, with `pictures`, a picture of a sweep; return lines to print.  Collective.
 
-    The sweep may still be running.  Raises CaseError if `out` is not a sweep folder.
+    The sweep may still be running.  Raises CaseError if `out` is not a sweep folder, FetiHomogError if a write fails.
     """
     with _started(comm) as comm:
         from feti_homog.studies import collect
@@ -136,10 +136,10 @@ def launch(
     parser: argparse.ArgumentParser,
     argv: Sequence[str] | None = None,
 ) -> int:
-    """Run `main(arguments, comm)` as a program, and return the exit code for `sys.exit`.
+    """Run `main(arguments, comm)` as a program, and return the exit code for `sys.exit`.  Collective.
 
-    PETSc reads the options in `argv` (default: the process's) with a single dash; `parser` reads the rest.  A
-    FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
+    PETSc reads the options in `argv` (default: of the process) with a single dash; `parser` reads the rest, and may
+    exit.  A FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
     """
 
     def command(words: Sequence[str], comm: Intracomm) -> int:
@@ -150,10 +150,10 @@ def launch(
 
 
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
-    """Start PETSc and run a command on all ranks.
+    """Start PETSc and run a command on all ranks.  Collective.
 
-    PETSc takes its options from `argv` (default: of the process), the command gets the other words.  Returns the exit
-    code of `run_main`, or the code for missing libraries.
+    PETSc takes its options from `argv` (default: of the process) and PETSC_OPTIONS; the command gets the other words.
+    Returns the exit code of `run_main`, or the code for missing libraries.
     """
     words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
@@ -176,7 +176,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
 
 def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
-    """Start PETSc with the options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError for faulty options."""
+    """Start PETSc with options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError and LibraryError."""
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
@@ -200,7 +200,7 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """Parse arguments on all ranks; rank 0 alone prints.  Raises SystemExit as argparse does.  Collective."""
+    """Parse arguments on all ranks; only rank 0 prints.  Raises SystemExit as argparse does.  Collective."""
     printed = io.StringIO()
     try:
         with contextlib.ExitStack() as redirected:
@@ -215,7 +215,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 @contextlib.contextmanager
 def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
-    """Context manager: start PETSc unless it runs; yield the communicator to one thread.  Raises like `run`."""
+    """Context manager: start PETSc unless it runs; yield `comm` (None: all ranks) to one thread.  Raises like `run`."""
     standard_streams.prepare()
     process.prefer_own_toolkits()
     libraries.require()

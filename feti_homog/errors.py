@@ -26,7 +26,7 @@ def escaped(text: str, allowed: str = "") -> str:
 class FetiHomogError(Exception):
     """An error printed for the user, one line per fault, without a traceback.
 
-    Lines beyond LONGEST_LINE keep their beginning and last KEPT_END characters; faults beyond MOST_FAULTS are counted.
+    Long lines keep LONGEST_LINE characters, among them the last KEPT_END; a line counts the faults after MOST_FAULTS.
     """
 
     exit_code = ExitCode.DEFECT

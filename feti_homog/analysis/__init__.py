@@ -1,8 +1,7 @@
 """Analyses of a torn cell: one module with `run(context)` for each [analysis] type, and the result of a case.
 
 Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `mesh`, `microstructure`, `report`, `results`,
-`schema` and `system`.
-Main entries: `runner.run` (with files) and `runner.compute` (without).
+`schema` and `system`.  Main entries: `runner.run` (with files) and `runner.compute` (without).
 """
 
 __all__ = ["description", "result", "runner", "stepped_progress", "stored_result"]

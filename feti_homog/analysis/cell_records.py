@@ -130,7 +130,7 @@ class SolverInfo:
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
-        """Return the record of the solvers in all problems.  Collective."""
+        """Return the record of all solvers, with the `iterations` and KSP `reasons` of each state.  Collective."""
         plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if plan.across else "bodies and pieces of bodies"
         uncut = "one subdomain, for nothing can part: one factor of the whole cell"

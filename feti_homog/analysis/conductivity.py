@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, unit_errors
+from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, response_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.homogenization import averaging, phase_laws, unit_cell
@@ -16,13 +16,13 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries of a conductivity.  Collective.
 
     These are `effective_conductivity`, closed forms and, on request, sensitivities and mesh errors.  The flux q and the
-    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*:
-    axial shear with k as shear moduli.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.  Column j
-    of the result is -<q> under the unit gradient j.
+    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*,
+    as in axial shear with shear moduli k.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.
+    Column j of the result is -<q> under the unit gradient j.
     """
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     k = columns["stiffness"]
-    errors, responses = unit_errors(context, responses)
+    errors, responses = response_errors(context, context.loads.by_problem(responses))
     context.record_unit_states(responses, 1.0, "", 0)
     context.checks.require("k^ef", {"symmetry": averaging.asymmetry(k)})
     document: dict[str, Any] = {"effective_conductivity": k}
@@ -44,7 +44,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
     """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.  Collective.
 
-    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).
+    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).  Maxwell's
+    estimate is None without `fibre_radii`, bounds are None with conductances.
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())

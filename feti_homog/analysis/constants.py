@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.errors import NotCarriedError
-from feti_homog.homogenization import averaging, phase_laws, unit_cell
+from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
 from feti_homog.materials import engineering_constants, laws, phase_bounds
 from feti_homog.microstructure import phase_names
 from feti_homog.system.runtime import records
@@ -32,7 +33,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
     """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     Returns {} for a plane cell with interfaces, and if faces touch without tension, since each stiffness column is then
-    a secant under a different load.
+    a secant under a different load.  A cell with voids has no bounds.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -102,7 +103,7 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     """Return a radius for each fibre phase, or None if closed forms do not apply.
 
-    Closed forms need round fibres without coatings, the same bonds for all phases and, for springs, equal radii.
+    Closed forms need round fibres without coatings, equal bonds for all phases and, with springs, one radius a phase.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
@@ -113,25 +114,25 @@ def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     return {phase: float(radius[0]) for phase, radius in radii.items()} if is_plain and is_round and is_like else None
 
 
-def unit_errors(
-    context: AnalysisContext, responses: list[averaging.Response]
+def response_errors(
+    context: AnalysisContext, groups: Sequence[Sequence[averaging.Response]]
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
-    """Estimate the mesh errors of the unit loads, problem by problem.  Collective.
+    """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
 
-    Also returns the responses, with element errors if a later step uses these errors.  The list of errors is empty if
-    the case has `mesh_error = false`.
+    Returns the errors of each group, [] if `mesh_error = false`, and one list of all responses, with estimated shares.
     """
     if not context.case.output.mesh_error:
-        return [], responses
-    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
+        return [], [*chain(*groups)]
+    from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
-    errors: list[mesh_estimate.EnergyErrors] = []
-    shared, keep = list[averaging.Response](), context.recovers_again
-    for problem, group in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
+    errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
+    for problem, responses in zip(context.loads.problems, groups, strict=False):
+        # Estimate and record share one recovery.
+        group = recovered_fields.recovered(problem.cell, responses) if context.states.is_recording else responses
         touches = problem.interface.contact and any(response.debonded for response in group)
-        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, keep))
-        shared += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
-    return errors, shared if keep else responses
+        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
+        estimated += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
+    return errors, estimated
 
 
 def mesh_error(
@@ -170,7 +171,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would suffice if the energy error exceeds the case's `accuracy`, if any.  Collective."""
+    """Note which mesh suffices if `energy`, the relative energy error on rank 0, exceeds `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
@@ -229,23 +230,22 @@ def state_error(
 ) -> tuple[dict[str, float], list[averaging.Response]]:
     """Estimate the mesh error of the energy under one load.  Collective.
 
-    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses,
-    with element errors if a later step uses these errors.
+    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses
+    with element errors.
     """
-    if not context.case.output.mesh_error:
-        return {}, list(responses)
-    from feti_homog.homogenization import mesh_estimate  # with the recovery of stresses
-
-    keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
-    errors = [mesh_estimate.energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
+    errors, estimated = response_errors(context, [[response] for response in responses])
+    if not errors:
+        return {}, estimated
     energy = sum(2 * response.stored for response in responses)
     size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
-    shared = [replace(r, shares=e.shares[:, 0] if keep else None) for r, e in zip(responses, errors, strict=True)]
-    return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
+    return {"mesh_error": size / energy if energy > 0 else 0.0}, estimated
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note a mesh error above `accuracy`, if any, under the first nonzero load, if the cell carries it.  Collective."""
+    """Note a mesh error above the `accuracy` of the case under the first nonzero load.  Collective.
+
+    Notes nothing without `accuracy` or `mesh_error`, or if the cell does not carry the load.
+    """
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
     cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))

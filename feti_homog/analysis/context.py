@@ -29,8 +29,8 @@ class CellLoads:
     """The loads of a cell, and averages over the cell under each load.
 
     Attributes:
-        problems: the plane problem, in which faces may touch, with the axial problem in generalized plane strain; or
-            conduction.
+        problems: the plane problem, in which faces may touch, and in generalized plane strain the axial problem; in
+            conduction, only the conduction problem.
         interfaces: the interfaces, coupled in all problems.
         names: names of the unit loads of all problems.
     """
@@ -129,7 +129,7 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: standard_streams.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Return a context without a folder; `states` = None records no states."""
+        """Return a context without a folder; without a recorder `states`, no fields are kept."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         return cls(CellLoads(cell, contact), CheckRecorder(cell.solver.rtol), recorder, progress)
@@ -148,11 +148,6 @@ class AnalysisContext:
     def case(self) -> Case:
         """Return the case of the cell."""
         return self.cell.case
-
-    @property
-    def recovers_again(self) -> bool:
-        """Return whether the run recovers interior displacements repeatedly, which makes factors worth their memory."""
-        return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
 
     def bonds(self, opening: float | None) -> BondState:
         """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
@@ -173,7 +168,7 @@ class AnalysisContext:
     def record_unit_states(
         self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
     ) -> None:
-        """Record one state for each unit load, in its problem.  Collective."""
+        """Record a state for each unit load, named `label` + load; see `StateRecorder.record`.  Collective."""
         in_plane = len(self.plane.loads) * self.cell.solver.problem.turns
         pairs = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
@@ -206,7 +201,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return all iterations, and the debonding under the last plane response, by result.json names.  Collective."""
+        """Build result.json entries: debonding of the last plane response, and the sum of iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

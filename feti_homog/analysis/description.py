@@ -18,7 +18,7 @@ from feti_homog.system.petsc import options_database
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """Describe a run of the case on these ranks, under its own options.  Collective.
+    """Describe a run of the case on these ranks, with the PETSc options of the case.  Collective.
 
     The text is empty except on rank 0.  Raises CaseError and MeshError as `unit_cell.tear` does.
     """
@@ -84,7 +84,7 @@ def _cost_lines(
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
         yield f"rank {rank:<5} {count} subdomain{'s' * (count > 1)}, {sum(components) * n} degrees of freedom"
     columns = multipliers if plan.preconditioner == "influence" else 0
-    memory = partition_policy.memory(nodes, subdomains, components, columns)
+    memory = partition_policy.memory(case, nodes, subdomains, components, columns)
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.analysis.constants import constants, mesh_error, unit_errors
+from feti_homog.analysis.constants import constants, mesh_error, response_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
@@ -47,17 +47,17 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
 
     `envelope` lists directions with the load at which the first bond breaks; all other entries follow from unit loads.
-    Raises CaseError if faces in the mesh are debonded and may touch.
+    Raises CaseError if faces in the mesh are debonded and may touch, and like `criterion_of`.
     """
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)
     if not context.plane.interface.is_linear(bonds.status):
         raise CaseError(
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
-            "superposes loads, which contact forbids"
+            'superposes loads, which contact forbids: type = "path" finds the onset of one load'
         )
     columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
-    errors, responses = unit_errors(context, responses)
+    errors, responses = response_errors(context, context.loads.by_problem(responses))
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})

@@ -10,7 +10,7 @@ from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entry `load`, the equilibrium of the prescribed debonded faces.  Collective.
+    """Return the `Result` entry `load`, the equilibrium with prescribed debonded faces.  Collective.
 
     The point has `tips` on debonded arcs for a load in the plane.  The case may also ask for `sensitivities`.
     """

@@ -29,8 +29,8 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Follow the path of the case and return its `Result` entries.  Collective.
 
-    `path` has a point for each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and
-    `resumed` the number of points from the checkpoint.  Each new converged point is written to the checkpoint at once.
+    `path` has each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and `resumed` the
+    count of restored points; new converged points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
     """
     path, law = context.case.section, criterion_of(context.cell, grows=True)
     assert isinstance(path, load_sections.LoadPath)
@@ -38,7 +38,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     count = min(path_events.resumable(context), path.max_events)
     work, entries, last = path_events.Work(), list[dict[str, Any]](), None
     bonds, top = list[tuple[float, float]](), ""
-    may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line has reported it
+    may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line reports the fall
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' * bool(before)}"
@@ -95,9 +95,9 @@ def _points(
 ]:
     """Yield each point with its responses.  Collective.
 
-    First come the `stored_events` of the checkpoint, with the numbers that `path_events.restored` adds, then new
-    points with None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no
-    equilibrium. Raises NotCarriedError if the cell does not carry the stresses of the first point.
+    First come the `stored_events` of the checkpoint, with the triple from `path_events.restored`, then new points with
+    None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no equilibrium.
+    Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))
@@ -189,8 +189,8 @@ def _completed(
 ) -> dict[str, Any]:
     """Return the `Result` entries `path`, `peak` and `states` of a finished path.  Collective.
 
-    The function marks the landmarks, names the most utilised of the `bonds` there, and records tips and fields at the
-    kept points.  The checkpoint provides all kept points except the last.
+    Marks landmarks in `entries`, adds tips and mesh errors at the kept points, records fields there, and drops lists
+    over fibres elsewhere.  `peak` names the most utilised of `bonds`.  The checkpoint has all kept points but the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks, states = landmarks.marks(document), dict[str, Any]()

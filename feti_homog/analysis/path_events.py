@@ -172,7 +172,7 @@ def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterf
 
 
 def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read an event and rebuild its path point; solve for missing multipliers.  Collective."""
+    """Read an event and rebuild its path point; solve for missing multipliers.  Collective; may raise CaseError."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     return event, point if "lam" in event else found_again(point, cell)
@@ -197,7 +197,7 @@ def resumable(context: AnalysisContext) -> int:
 
 
 def consistent(context: AnalysisContext, count: int) -> int:
-    """Count the leading events with arrays, bonds, loads and energies that fit the path.  Collective."""
+    """Count the first events whose arrays, bonds, loads and energies fit the path.  Collective; raises like `read`."""
     cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
     waypoints = [context.loads.load(target) for target in context.case.targets]
     waypoints, legs = [Load(0.0 * waypoints[0].values, waypoints[0].by_stress), *waypoints], len(waypoints)
@@ -225,10 +225,10 @@ def consistent(context: AnalysisContext, count: int) -> int:
 
 
 def holding(context: AnalysisContext, count: int) -> int:
-    """Count the valid events among the first `count` of the checkpoint.  Collective.
+    """Count the valid events among the first `count` of the checkpoint.  Collective; raises like `read`.
 
-    Completes and checks the last events, back to the point at which products F lambda with the dual operator F have
-    confirmed every problem.  Events are invalid from the first failed check or wrong mean on.
+    Completes and checks all events since products F lambda with the dual operator F last confirmed every problem.  A
+    failed check or a wrong mean makes its event and all later events invalid.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:

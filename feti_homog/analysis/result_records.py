@@ -1,7 +1,7 @@
 """Define the records of points, tips and mesh errors in result.json, which are fields of `result.Result`.
 
-Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the moduli's unit, per unit depth; in generalized
-plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
+Strains are [E11, E22, gamma12], in generalized plane strain [E11, E22, E33, gamma23, gamma13, gamma12].  Stresses are
+[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  They and energies per cell area have the unit of the moduli.
 """
 
 from collections.abc import Mapping
@@ -53,8 +53,8 @@ class MeshErrors:
 class Tips:
     """The t tips at a path point, by fibre, interface and direction.
 
-    A tip is an intact bond next to a broken bond.  Its driving energy per area is compared with G_c(psi): the energy of
-    its spring or, where `growth` is "released", the energy that its break would release.
+    A tip is an intact bond next to a broken bond.  The driving energy per area, which compares with G_c(psi), is the
+    energy of the spring or, where `growth` is "released", the energy that a break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")

@@ -81,7 +81,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) -> Iterator[unit_cell.TornCell]:
-    """Context manager: tear the cell while the PETSc options of the case are set.  Collective.
+    """Context manager: tear the cell, and free it at the end, under the PETSc options of the case.  Collective.
 
     Turns LinAlgError, from matrices singular by rounding, into ConvergenceError.
     """
@@ -138,20 +138,19 @@ def _run_and_write(
         context.checkpoint.clear()
     standard_streams.remarks.clear()
 
-    def draw() -> list[Path]:
-        from feti_homog.report.plots import figures  # loads Matplotlib, on this rank only
+    if output.pictures:
+        with progress.stage("pictures") as line:
+            from feti_homog.report.plots import figures  # loads Matplotlib
 
-        return figures.plot(directory)
+            document = mpi_errors.on_root(cell.comm, output_folder.latest, directory)
+            share = slice(cell.comm.rank, None, cell.comm.size)
+            paths = cell.comm.allgather(mpi_errors.agree(cell.comm, figures.draw, directory, document, share))
+            line.append(", ".join(sorted(path.name for drawn in paths for path in drawn)))
+    if output.report:
+        with progress.stage("report") as line:
+            from feti_homog.report import page  # loads tables
 
-    def report() -> list[Path]:
-        from feti_homog.report import page  # loads tables, on this rank only
-
-        return [page.write(directory)]
-
-    for name, is_asked, make in (("pictures", output.pictures, draw), ("report", output.report, report)):
-        if is_asked:
-            with progress.stage(name) as line:
-                line.append(", ".join(path.name for path in mpi_errors.on_root(cell.comm, make)))
+            line.append(mpi_errors.on_root(cell.comm, page.write, directory).name)
     _print_summary(result, progress)
     return result
 
@@ -234,13 +233,13 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
-    """Print the summary on rank 0, without warnings and faults.  Collective.
+    """Print the summary on rank 0, without faults.  Collective.
 
-    Warnings were printed before; the error that follows states the faults.  Other ranks load no tables.
+    The error that follows states the faults.  Other ranks load no tables.
     """
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary
 
-        printed = replace(result, timings=timings, warnings=(), faults=())
+        printed = replace(result, timings=timings, faults=())
         progress.say(f"\n{summary.summary(printed.document)}")

@@ -101,7 +101,7 @@ def _cells(context: AnalysisContext) -> list[unit_cell.TornCell]:
 
 
 def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
-    """Assemble the stiffness and the thermal stress from the energies in each problem."""
+    """Assemble stiffness and thermal stress, None without temperature, from `Derivative.energies`."""
     changed = phase_laws.secants(*energies)
     return changed["stiffness"], changed.get("thermal_stress")
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from feti_homog.analysis.constants import constants, mesh_error, unit_errors
+from feti_homog.analysis.constants import constants, mesh_error, response_errors
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization import averaging
 
@@ -17,14 +17,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     bonds, starts = context.bonds(None), context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
-    errors, responses = unit_errors(context, responses)
+    errors, responses = response_errors(context, context.loads.by_problem(responses))
     errors_of_minus = errors[:0]
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads, first = list(responses), list(context.loads.names), responses
     if one_sided:
         minus, responses = context.unit_responses("", bonds, starts, -1.0)
-        errors_of_minus, responses = unit_errors(context, responses)
+        errors_of_minus, responses = response_errors(context, context.loads.by_problem(responses))
         context.record_unit_states(responses, -1.0, "-", 0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}

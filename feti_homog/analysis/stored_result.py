@@ -16,8 +16,7 @@ from feti_homog.schema import keys, wording
 def read(directory: Path) -> dict[str, Any]:
     """Read a result or an unfinished path, and check its result.h5, if any.  Call on one rank.
 
-    Raises:
-        CaseError: a file is missing, damaged, or from another program or run.
+    Raises CaseError if a file is missing, damaged, or from another program or run.
     """
     document = output_folder.latest(directory)
     result = _restored(directory, document)
@@ -47,8 +46,7 @@ def check_to_draw(directory: Path) -> str:
 def finished(directory: Path, case: Case, ranks: int) -> bool:
     """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
 
-    Raises:
-        CaseError: the result or checkpoint is damaged or of another case, or the checkpoint of another rank count.
+    Raises CaseError if the result or checkpoint is damaged or of another case, or the checkpoint of another rank count.
     """
     path = directory / checkpoints.FOLDER / checkpoints.NAME
     if path.parent.is_dir():
@@ -74,7 +72,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
 
 
 def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
-    """Raise CaseError with the keys, or rank counts, that differ between a case and a stored case."""
+    """Raise CaseError with the text `start` and the keys or ranks that differ from `stored`, except in `skipped`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
     before, now = (

@@ -23,12 +23,10 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
-    """Return the bond law for debonding that `grows`, or for its onset alone.  Collective.
+    """Return the bond law for growing debonding if `grows`, else for the onset of debonding.  Collective.
 
     The law of released energies needs tips: growing debonding creates them, prescribed debonded faces have them.
-
-    Raises:
-        CaseError: tips need the inverse dual operator, which the solver does not have.
+    Raises CaseError if tips need the inverse dual operator, which the solver does not have.
     """
     law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, energy.SpringEnergy) and cell.case.interfaces[0].growth == "released"):
@@ -43,7 +41,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return energy release rates at all tips under in-plane `loads`.  They are empty without tips.  Collective."""
+    """Return energy release rates at tips under the in-plane loads among `loads`; empty without tips.  Collective."""
     rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)

@@ -36,12 +36,12 @@ class BondLawEntry:
     softens: bool = False
 
     def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
-        """Word the fault of a required key that a table lacks, with a value that the user may choose."""
+        """Return the fault of the required key `name` that a table lacks, in most cases with a possible value."""
         fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
             return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
         if name == COHESIVE[0] and "between" in table:
-            return f"{fault}; bonds that hold have 100 times the strengths and 1e4 times the toughnesses of others"
+            return f"{fault}; bonds that hold have {' = inf, '.join(COHESIVE[:2])} = inf, and no other constants"
         hint = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
         return f"{fault}, such as {hint}" if name == STIFFNESSES[0] else fault
 
@@ -51,7 +51,7 @@ STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 BRANCH = ("openings", "tractions")
-"""Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH to the law "table" alone."""
+"""Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH only to the law "table"."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (

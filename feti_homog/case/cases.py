@@ -89,7 +89,7 @@ class Case:
 
         All other keys stay as in the file or document.  A number, from 1, selects one of several sections or an entry
         of a list, as in `interface.2.friction` and `material.fibre.expansion.3`; `material.fibre.stiffness.C12` sets
-        both symmetric entries; None removes a key.  Raises CaseError.
+        both symmetric entries; None removes a key.  Raises like `parse`.
         """
         (document, folder), faults = self.source, list[str]()
         changed = with_values(document, dict(leaves(to_document(changes))), faults)
@@ -144,7 +144,8 @@ class Case:
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
         least = min(float(laws.stiffness_of(m, self.analysis.plane).max()) for m in self.materials.values())
-        tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in self.interfaces]
+        bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
+        tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in bonds]
         tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
         units = [f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are both in one unit?"
                  for section, table, end in tables for name, value in vars(table).items()
@@ -179,7 +180,7 @@ class Case:
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
-        """Return a digest of all settings that change results.
+        """Return a digest of all settings that change results.  Raises OSError if a file of [cell] is unreadable.
 
         Name, PETSc options and max_events are left out, also [output] without `with_output`; files count by content.
         """
@@ -206,7 +207,7 @@ def check_stored(values: Mapping[str, Any]) -> None:
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Read all sections of a document; return the fields of `Case`, and all faults.
 
-    A faulty section is None. Without a folder, the cell is None, and its files remain unread.
+    A faulty section is None, but materials and PETSc options stay tables.  Without a folder the cell is None.
     """
     analysis = document.get("analysis")
     if isinstance(analysis, dict) and analysis.get("type") == "conductivity":

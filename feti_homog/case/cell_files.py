@@ -72,9 +72,9 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         return cell
     if not random_fibres.nearest_neighbours(window, random_fibres.SHELLS).weights.any(axis=0).all():
         faults.append(f"{given}: the window is too small to find the nearest and second neighbours of any fibre")
-    if cell.fibres is None and window.count < FEWEST_MATCHED:
-        faults.append(f"[cell] fibres = {window.count}: expected at least {FEWEST_MATCHED} with match")
     count = window.count if cell.fibres is None else cell.fibres
+    if count < FEWEST_MATCHED:
+        faults.append(f"[cell] fibres = {count}: expected at least {FEWEST_MATCHED} with match")
     fraction = window.fibre_fraction if cell.fibre_fraction is None else cell.fibre_fraction
     return replace(cell, match=file, matched=window, fibres=count, fibre_fraction=fraction)
 
@@ -85,11 +85,10 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     from feti_homog.microstructure.shapes import shapes
 
     try:
-        table = (
-            fibre_table.read_table(cell.file, cell.columns)
-            if cell.file is not None
-            else fibre_table.table_of(cell.fibre_list or (), LIST)
-        )
+        if cell.file is None:
+            table = fibre_table.table_of(cell.fibre_list or (), LIST)
+        else:
+            table = fibre_table.read_table(cell.file, cell.columns)
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell

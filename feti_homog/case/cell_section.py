@@ -268,7 +268,7 @@ class Cell:
 
     @property
     def has_voids(self) -> bool:
-        """Return whether the case has voids or hollow fibres, apart from voids in images."""
+        """Return whether the cell has voids or hollow fibres, apart from voids in images."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 

@@ -42,7 +42,7 @@ def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tup
 
 
 def _above(limit: float, materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
-    """List the phases with a Poisson's ratio above a limit; none in plane stress and conduction."""
+    """List the isotropic phases with Poisson's ratio above a limit; none in plane stress and conduction."""
     if not voigt.PLANE_STATES[plane].locks:
         return []
     lines = []
@@ -60,7 +60,7 @@ CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
 # inclusions raise this error: 1.5 times the largest values that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
-# Upper bound of kappa s in cells with mixed elements alone.
+# Upper bound of kappa s in cells with only mixed elements.
 MIXED_CONDITION = 33.0
 MOST_REFINED = 8
 
@@ -179,11 +179,8 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 def fractions_in_words(cell: Cell) -> str:
     """Write the fibre and void fractions of a cell without a file as keys."""
-    fibres = (
-        f"fibre_fraction = {cell.fibre_fraction:g}"
-        if cell.mix is None
-        else f"mix = {wording.toml_value(dict(cell.mix))}"
-    )
+    mix = "" if cell.mix is None else f"mix = {wording.toml_value(dict(cell.mix))}"
+    fibres = mix or f"fibre_fraction = {cell.fibre_fraction:g}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
@@ -228,10 +225,8 @@ def mix_faults(cell: Cell) -> list[str]:
     if fsum(cell.mix.values()) >= 1:
         faults.append(f"{given}: expected a sum below 1")
     if cell.radii is not None and set(cell.radii) != set(cell.mix):
-        expected = ", ".join(cell.mix)
-        faults.append(
-            f"[cell] radii = {wording.toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}"
-        )
+        expected = f"expected a radius of each of mix: {', '.join(cell.mix)}"
+        faults.append(f"[cell] radii = {wording.toml_value(dict(cell.radii))}: {expected}")
     if faults:
         return faults
     expected_counts = _expected_counts(cell)

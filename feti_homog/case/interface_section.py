@@ -74,7 +74,7 @@ class InterfaceSection:
     Without this section bonding is perfect. Several sections [[interface]], one per pair of phases, must have the same
     contact, scatter, and law with its teeth, branch and growth.
 
-    None stands for an unlimited strength.
+    None stands for an unlimited strength, stiffness or conductance.
     """
 
     contact: bool = key(
@@ -127,7 +127,8 @@ class InterfaceSection:
     )
     normal_strength: float | None = strength_key(
         "R^n: normal traction at which a bond breaks; with a law that softens, N: normal traction at which its damage "
-        "begins. A force per area: it does not depend on the mesh."
+        "begins. A force per area: it does not depend on the mesh. With a law that softens, inf in both strengths "
+        "and no other constants: the bonds hold, with 1e4 times the normal constants of another [[interface]]."
     )
     tangential_strength: float | None = strength_key(
         "R^t: tangential traction at which a bond breaks; with a law that softens, S: traction in the plane and along "
@@ -238,5 +239,5 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
 
 
 def labelled(sections: Sequence[T]) -> list[tuple[str, T]]:
-    """Return the interface sections with their labels in messages; several sections are numbered from 1."""
+    """Return pairs (label in messages, interface section); the labels of several sections are numbered from 1."""
     return [(f"interface {number}" if len(sections) > 1 else "interface", s) for number, s in enumerate(sections, 1)]

@@ -1,7 +1,6 @@
 """Read the [material.PHASE] sections, and find the material of each mesh phase."""
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -45,9 +44,8 @@ def read_materials(
         return {}
     table = document["material"]
     if not isinstance(table, dict):
-        reader.faults.append(
-            f"material = {wording.toml_value(table)}: expected sections [material.matrix], [material.fibre]"
-        )
+        expected = "expected sections [material.matrix], [material.fibre]"
+        reader.faults.append(f"material = {wording.toml_value(table)}: {expected}")
         return {}
     geometry = reader.selected[GEOMETRY]
     fibres = fibre_phases(document.get("cell")) if geometry in CIRCULAR else None
@@ -77,16 +75,15 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell | None, materials: object) -> list[str]:
-    """List coatings without a material, and a coating material without coatings; [] for a user's mesh."""
+    """List coatings without a material, and coating materials without coatings; [] for faulty sections or own mesh."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())
     if has_coatings and phase_names.COATING not in materials:
         return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
     if not has_coatings and phase_names.COATING in materials:
-        return [
-            f"[material.{phase_names.COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"
-        ]
+        expected = "expected [cell] coating, or a column of a table"
+        return [f"[material.{phase_names.COATING}]: no fibre has a coating; {expected}"]
     return []
 
 
@@ -96,10 +93,11 @@ def _read_material(
     """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
     names, given = [*table] if isinstance(table, dict) else [], dict[str, list[str]]()
     sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
-    if not sheet.keys() <= FORMS_OF.keys():
+    if isinstance(table, dict) and not sheet.keys() <= FORMS_OF.keys():
         axes = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
         reader.faults.append(f"[{section}] {axes}: give {', '.join(sheet.values())}")
-        return None
+        table = {sheet.get(name, name): value for name, value in table.items()}  # for its other faults
+        names = [*table]
     for name, (form, *further) in FORMS_OF.items():
         if name in names and not further:
             given.setdefault(form, []).append(name)
@@ -110,10 +108,11 @@ def _read_material(
         way = laws.OF_DATA_SHEETS if "orthotropic" in forms else "a material is of one kind"
         reader.faults.append(f"[{section}] {groups}: exclude each other; {way}")
         return None
-    material: material_forms.Material | None = reader.read(material_forms.MATERIAL_FORMS[forms[0]], table, section)
-    if material is None and "orthotropic" in forms and ": missing" in reader.faults[-1]:
-        reader.faults[-1] += f"; {laws.OF_DATA_SHEETS}"
-    elif material is not None:
+    kind = material_forms.MATERIAL_FORMS[forms[0]]
+    material: material_forms.Material | None = reader.read(kind, table, section)
+    missing = laws.missing_constants(kind, names, plane) if plane and plane != voigt.CONDUCTION.name else []
+    reader.faults += [f"[{section}] {fault}" for fault in missing]
+    if material is not None and not missing:
         checks: list[Callable[[Any], object]] = [] if plane is None else [partial(laws.stiffness_of, plane=plane)]
         if material.strength is not None and plane != voigt.CONDUCTION.name:
             checks += [lambda m: material_forms.criterion(m.strength), partial(_known_stress, plane=plane)]
@@ -132,17 +131,17 @@ def _known_stress(material: material_forms.Material, plane: str | None) -> None:
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")
 
 
-def missing_expansions(materials: Mapping[str, material_forms.Material], needed_by: str) -> list[str]:
-    """List materials without the thermal expansion that the key `needed_by` requires.
+def missing_expansions(tables: object, needed_by: str) -> list[str]:
+    """List material tables without the thermal expansion that the key `needed_by` requires.
 
-    Materials with other faults are skipped: `read_materials` reports them.
+    Tables with unknown keys, which may be misspelt expansions, are skipped.
     """
     faults, pair = [], f"{', '.join(material_forms.EXPANSION_PAIR)}, or one expansion"
-    for phase, material in materials.items():
-        name = pair if isinstance(material, material_forms.TransverselyIsotropic) else "expansion"
-        with suppress(ValueError):
-            if laws.expansion(material) is None:
-                faults.append(f"[material.{wording.toml_key(phase)}] {name}: missing; {needed_by} needs it")
+    for phase, table in tables.items() if isinstance(tables, dict) else ():
+        names = table.keys() if isinstance(table, dict) else {"expansion"}
+        if names <= FORMS_OF.keys() and not {"expansion", *material_forms.EXPANSION_PAIR} & names:
+            name = pair if {"E_axial", "E_transverse"} & names else "expansion"
+            faults.append(f"[material.{wording.toml_key(phase)}] {name}: missing; {needed_by} needs it")
     return faults
 
 

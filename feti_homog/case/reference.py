@@ -131,7 +131,7 @@ def _has(word: str, *texts: str) -> bool:
 
 
 def text(word: str = "", results: Sequence[str] = ()) -> str:
-    """Write an index and the reference or, with a `word`, the tables and `results` with it.  Raises CaseError."""
+    """Write an index and the reference or, with a `word`, matching tables and `results`.  Raises like `tables`."""
     references = tables(word, results)
     if word:
         described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)

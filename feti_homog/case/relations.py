@@ -51,7 +51,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     if envelope is not None and envelope.temperature is not None:
         heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:
-        faults += missing_expansions(sections["materials"], heated[0])
+        faults += missing_expansions(document.get("material"), heated[0])
     faults += coating_faults(sections["cell"], document.get("material"))
     if angle is not None and angle.strain is not None and not any(angle.strain):
         faults.append("[angle] strain: expected a strain other than zero")
@@ -61,10 +61,10 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a remark, in generalized plane strain, on axes that users could take for ply axes; () without any."""
+    """Return a remark on axes that may be taken for ply axes; () without such axes or generalized plane strain."""
     if plane != voigt.GENERALIZED.name:
         return ()
-    from feti_homog.materials import engineering_constants  # needed in generalized plane strain alone
+    from feti_homog.materials import engineering_constants  # needed only in generalized plane strain
 
     loaded = [name for load in section.placed.values() for name, value in load_sections.named(load).items() if value]
     of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)
@@ -102,6 +102,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
             interfaces.append(replace(named, **_of_branch(named)))
     if len(interfaces) < len(tables):
         return None
+    interfaces = _held(interfaces)
     first: dict[frozenset[str], int] = {}
     for number, (label, interface) in enumerate(labelled(interfaces) if len(tables) > 1 else ()):
         if interface.between is None:
@@ -123,9 +124,19 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
 
 
 def _written(value: Any) -> str:
-    """Format the value of a key on which all interfaces must agree, as in TOML."""
+    """Format the value of a key on which all interfaces must agree, as in TOML; "none" for None."""
     table = keys.to_table(value, {}) if isinstance(value, Scatter) else value
     return "none" if table is None else wording.toml_value(table)
+
+
+def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
+    """Replace unlimited strengths under a cohesive law by 1e4 times the normal constants of bonds that break."""
+    names = (*STIFFNESSES, *COHESIVE)
+    breaking = next((bond for bond in interfaces if all(getattr(bond, name) for name in names)), None)
+    if breaking is None:
+        return interfaces
+    held = {name: 1e4 * getattr(breaking, name.replace("tangential", "normal")) for name in names}
+    return [bond if any(getattr(bond, name) for name in names) else replace(bond, **held) for bond in interfaces]
 
 
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:

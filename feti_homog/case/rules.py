@@ -8,8 +8,8 @@ from itertools import product
 from typing import Any
 
 from feti_homog.case import section_values as kinds
-from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
-from feti_homog.case.cell_section import FEWEST_MATCHED, MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
+from feti_homog.case.bond_laws import COHESIVE, REGISTRY, STIFFNESSES, STRENGTHS
+from feti_homog.case.cell_section import MESH, MESHED, OWN_MESH, PIXELS, RANDOM, TABLE, Cell
 from feti_homog.case.cell_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter, interface_tables
 from feti_homog.case.load_sections import MixedLoad
@@ -78,7 +78,7 @@ class Rule:
 
 
 def has(table: Any, *names: str) -> bool:
-    """Return whether a value is a table that has all these keys."""
+    """Return whether a value is a table with all the keys `names`."""
     return isinstance(table, dict) and {*names} <= table.keys()
 
 
@@ -171,12 +171,6 @@ def _cell() -> Iterator[Rule]:
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     pair, line = ("match", "radius_spread"), "exclude each other; the table gives the radii"
     yield Rule(CELL, lambda cell: not has(cell, *pair) or cell["radius_spread"] == 0, line, names=pair)
-    yield Rule(
-        CELL,
-        lambda cell: not (has(cell, "match", "fibres") and types.is_number(n := cell["fibres"]) and n < FEWEST_MATCHED),
-        lambda cell, _: f" = {cell['fibres']}: expected at least {FEWEST_MATCHED} with match",
-        names=("fibres",),
-    )
 
 
 def _files() -> Iterator[Rule]:
@@ -196,13 +190,11 @@ def _files() -> Iterator[Rule]:
     yield _refused("window", types.choice("mirrored"), '"periodic" or "cut"', TABLE)
     yield _refused("window", types.choice("cut"), '"periodic" or "mirrored"', PIXELS)
     line = "belongs to smooth = true; else elements are halves of pixels"
-    yield Rule(
-        CELL,
-        lambda cell: cell.get("smooth") is True or cell.get("mesh_size", Cell.mesh_size) == Cell.mesh_size,
-        line,
-        (PIXELS,),
-        ("mesh_size",),
-    )
+
+    def has_default_size(cell: Any) -> bool:
+        return cell.get("smooth") is True or cell.get("mesh_size", Cell.mesh_size) == Cell.mesh_size
+
+    yield Rule(CELL, has_default_size, line, (PIXELS,), ("mesh_size",))
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
@@ -226,13 +218,16 @@ def _bonds() -> Iterator[Rule]:
     opens = partial(_any_section, lambda table: any(name in table for name in ways))
     yield Rule((), opens, line, (kinds.ANALYSIS_TYPE.among("stiffness", "load"), MESHED))
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
-    for law in REGISTRY:
-        for name in law.needs:
-            rule = needed(INTERFACE, name, "", kinds.BREAKING, kinds.CRITERION.among(law.name))
-            yield replace(rule, words=partial(law.missing, name))
+
+    def never_break(table: Any) -> bool:
+        return all(has(table, name) and table[name] in (math.inf, types.INF) for name in COHESIVE[:2])
+
+    for law, name in ((entry, name) for entry in REGISTRY for name in entry.needs):
+        rule, when = needed(INTERFACE, name, ""), (kinds.BREAKING, kinds.CRITERION.among(law.name))
+        holds = partial(lambda rule, table: rule.holds(table) or never_break(table), rule)
+        yield replace(rule, holds=holds, words=partial(law.missing, name), when=when)
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
-    line = f"[interface]: missing section; {type_} needs it"
-    yield needed((), "interface", line, kinds.ENVELOPE_ANALYSIS)
+    yield needed((), "interface", f"[interface]: missing section; {type_} needs it", kinds.ENVELOPE_ANALYSIS)
     for plane, names in ((kinds.IN_THE_PLANE, STRENGTHS[:2]), (kinds.GENERALIZED, STRENGTHS)):
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         yield Rule((), partial(_any_section, partial(_breaks, names)), line, (kinds.ENVELOPE_ANALYSIS, plane))
@@ -241,12 +236,13 @@ def _bonds() -> Iterator[Rule]:
         tables = [table for table in interface_tables(document) if isinstance(table, dict)]
         return all(table.get("contact") is False for table in tables) or not any(map(_some_arc, tables))
 
-    line = f"expected false with debonded arcs; {type_} superposes loads, which contact forbids"
+    way = 'which contact forbids: type = "path" finds the onset of one load'
+    line = f"expected false with debonded arcs; {type_} superposes loads, {way}"
     yield Rule((), touches_nowhere, f"[interface] contact: {line}", (kinds.ENVELOPE_ANALYSIS,))
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test; true without sections, or if one is not a table."""
+    """Return whether an [interface] section passes a test or is not a table; true without the key `interface`."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
@@ -276,9 +272,8 @@ def _loads_and_outputs() -> Iterator[Rule]:
     yield Rule(plane, lambda value: value == scalar, line, (kinds.CONDUCTIVITY,))
     line = 'belongs to type = "conductivity"'
     yield Rule(plane, lambda value: value != scalar, line, (kinds.MECHANICAL,))
-    rule = belonging(
-        ("output", "sensitivities"), kinds.ANALYSIS_TYPE.among(*DIFFERENTIABLE), _values(kinds.ANALYSIS_TYPE)
-    )
+    condition = kinds.ANALYSIS_TYPE.among(*DIFFERENTIABLE)
+    rule = belonging(("output", "sensitivities"), condition, _values(kinds.ANALYSIS_TYPE))
     yield replace(rule, holds=lambda value: value is not True)
     along = {*voigt.SPATIAL_STRESSES, *voigt.SPATIAL_STRAINS} - {*voigt.STRESSES, *voigt.STRAINS}
     for place in (("output", "stress"), ("envelope", "plane", ITEMS)):

@@ -14,7 +14,7 @@ STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 SEED = types.integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk", ".mesh")
-MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file"
+MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file (else: gmsh a.med -save -o a.msh, meshio convert a.xdmf a.vtu)"
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".npz")
 IMAGE_FILE = ".png, .tif, .npy or .npz file"
 

@@ -246,7 +246,7 @@ class SectionTable:
 
     Attributes:
         section: section name.
-        place: position in the file, in words; for a material with its form.
+        place: position in the file as a text, such as "[load] to" or "[material.PHASE], FORM".
         contents: dataclass with the table keys.
     """
 
@@ -281,7 +281,7 @@ KEY_OWNERS = {
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """Return the options in [petsc], {} for other values, and append faults; runs check the values of options."""
+    """Return the options in [petsc], {} if it is no table, and append faults; runs check the values of options."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}

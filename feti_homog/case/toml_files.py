@@ -24,7 +24,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Read a TOML document; its default `name` is the file name without suffix.  Raises CaseError."""
+    """Read TOML; its default `name` is the file name without suffix.  Raises CaseError if it is no readable TOML."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -163,7 +163,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the only entry of a list if it is a list or, unless `name` is a number, a table; else return `table`."""
+    """Return the only entry of the list `table` if it is a list, or a table and `name` no number; else `table`."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 

@@ -20,8 +20,8 @@ def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
     The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
-    coatings `coating`, hollow fibres `inner_radius`. Numbers are exact, so that the table reproduces the cell, unless
-    a mesh has other shapes than discs and ellipses: their rows have no radius, nor a centre if they wind around.
+    coatings `coating`, hollow fibres `inner_radius`, polygons `sides` and `corner`.  Numbers are exact: the table
+    reproduces the cell, unless a mesh has other shapes: they have no radius, no centre if they wind around the torus.
 
     Raises:
         CaseError, MeshError: the source is faulty, or does not list its voids.

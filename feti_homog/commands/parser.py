@@ -100,8 +100,8 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     plot.add_argument("--format", choices=("png", "pdf", "svg"), default="png", help="pdf, svg: vector graphics")
     words = 'draw this state alone: number in result.h5, from 0, label, such as "event 12", or mark, such as "peak"'
     plot.add_argument("--state", metavar="STATE", help=words)
-    stresses = ("S11", "S22", "S12", "S33", "S23", "S13", "von_mises")
-    plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress to draw: S11, ..., or von_mises")
+    stresses = ("S11", "S22", "S12", "S33", "S23", "S13", "von_mises", "principal")
+    plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress: S11, ..., von_mises or principal")
     plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
     plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
     fields.add_argument(
@@ -163,7 +163,7 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
 def _command(
     commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
 ) -> Parser:
-    """Add a command that calls the function `action`, "module.function", and return its parser."""
+    """Add a command with the name of the function that it calls, `action` = "module.function"; return its parser."""
     parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
     parser.set_defaults(action=action)
     return parser

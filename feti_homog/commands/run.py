@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Describe the run of a case, or a study with the run of its first case.  Collective."""
+    """Print the description of a case, or of a study and its first case.  Collective."""
     from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of all keys, or of entries that contain the given words.  Collective."""
+    """Print the reference of all keys, or of entries that contain the phrase `word`.  Collective."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 

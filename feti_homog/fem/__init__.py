@@ -1,4 +1,4 @@
-"""Plane elasticity on linear and (isoparametric) quadratic triangles, vectorized over elements.
+"""Plane elasticity, axial shear and conduction on linear and isoparametric quadratic triangles, vectorized.
 
 Imports `mesh`.  Main entry: `assembly.assemble`, the stiffness matrix and load columns of one subdomain.
 """

@@ -22,8 +22,7 @@ class ArcSides:
 
     Attributes:
         element, side: (f,) element number, and number of the corner at which the side starts.
-        nodes: (f, p + 1) plane nodes along the side.
-        points: (f, p + 1, 2) node positions.
+        nodes, points: (f, p + 1) plane nodes along the side, and (f, p + 1, 2) their positions.
         normals: (f, p + 1, 2) unit normals of the arc at the nodes, out of the body.
         area: (f,) area that the body lacks between the side and the arc, negative for a surplus.
         at_void: (f,) whether a void is on the right.
@@ -39,7 +38,7 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find the refined element sides along the body's arcs."""
+        """Find the element sides along the arcs of `body`, which joins `submeshes` that `lattice` refines."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # On side k, from vertex k to the next vertex, the barycentric coordinate of the third vertex is zero.
@@ -75,7 +74,7 @@ class ArcSides:
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.
 
-    Diagonal entries are twice the energy error.  The estimate is
+    Diagonal entries are twice the energy error.  With recovered stresses sigma, the estimate is
 
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 

@@ -31,7 +31,8 @@ class Assembly:
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L, strains B u*: E has the load -Q E, Eq. (29), and stress integral |Omega| L E + Q^T u*.
+        Q: (dofs, v) int B^T L, where B u* are the strains of fluctuating displacements u*.  A macroscopic strain E
+            has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
         areas: (materials,) areas of the materials; their sum is |Omega|.
     """
@@ -47,11 +48,11 @@ def assemble(
 ) -> Assembly:
     """Assemble the matrices of a subdomain with one or several materials.
 
-    The first rows and columns of L belong to displacement strains, the last to uniform strains.  Quadratic elements
-    with isotropic stiffness in the plane may be mixed: with a bubble and a pressure (`MixedElements`).
+    The first rows and columns of L belong to displacement strains, the others to loads that are uniform in the cell.
+    Quadratic elements with isotropic stiffness in the plane may be mixed: with bubble and pressure (`MixedElements`).
 
     Args:
-        laws: stiffness L (v, v), or (materials, v, v) with the `material` (t,) of every coarse triangle.
+        laws: stiffness L (v, v) or (materials, v, v); several need the `material` (t,) of every coarse triangle.
         mixed: whether the elements are mixed, for all materials or material by material.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
@@ -81,7 +82,10 @@ def assemble(
 
 @lru_cache(maxsize=16)  # pieces of a label image have few different classes
 def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
-    """Find the couples (t p) that each block of K sums, the block columns, and the first block of each row."""
+    """Find the pattern of K: sums (blocks, t p) of couples to blocks, the block columns, and each row's first block.
+
+    `classes` holds the bytes of the node classes (t, q) of all coarse triangles; K has (n, n) blocks.
+    """
     of_triangle, macro = np.frombuffer(classes, np.int32).reshape(-1, len(lattice.nodes)), MacroElement.of(lattice)
     rows, columns = of_triangle[:, macro.rows], of_triangle[:, macro.columns]
     by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(rows.size + 1)), shape=(n, rows.size)).tocsr()
@@ -117,10 +121,10 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate affine coarse triangles `part` (t,) on the unit triangle; `mixed` is None or mixed elements' stiffness.
+    """Integrate the affine coarse triangles `part` (t,) on the unit triangle.
 
-    Returns:
-        Stiffness blocks (t, p, c^2) of the node couples, integrals (t, q, 2) of the gradients, and the total area.
+    `tensor` (4, c^2) turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j); `mixed` is the stiffness of mixed elements, or
+    None.  Returns stiffness blocks (t, p, c^2) of the node couples, gradient integrals (t, q, 2) and the total area.
     """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two linear functions are the reference coordinates, so that inverse_rk = dr_r / dx_k.
@@ -137,7 +141,7 @@ def _affine(
 def _curved(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate coarse triangles with curved edges, element by element; arguments as in `_affine`."""
+    """Integrate coarse triangles with curved edges, element by element; arguments and results are as in `_affine`."""
     elements = mesh.lattice.triangles
     points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
     g, w = gradients(points)
@@ -224,7 +228,7 @@ def integrals(g: Float, w: Float) -> Float:
 
 
 def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
-    """Compute the unit loads (cn, m) of tractions t = Sigma n on the sides, f = -Q Sigma; (cn, 0) if none are given."""
+    """Compute Q (dofs, m): tractions Sigma n on the cell sides have the load -Q Sigma; (dofs, 0) without tractions."""
     if submesh.boundary != "traction":
         return np.zeros((problem.components * mesh.n_classes, 0))
     unit = np.concatenate(np.eye(problem.strains)[problem.voigt], axis=1)
@@ -249,7 +253,7 @@ def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """Return the nodes (sides, intervals + 1) along the torus edges in a mask, ordered with the body on the left."""
+    """Return the nodes (sides, intervals + 1) along the torus edges in a mask; the body is on the left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

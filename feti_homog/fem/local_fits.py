@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """The n pairs of a boundary vertex, which has few elements, and a neighbour vertex.
+    """The n pairs of a boundary vertex, with few elements, and a neighbour; the neighbour has the weight NEIGHBOURS.
 
     Attributes:
         at, other: (n,) boundary vertex and neighbour vertex.
@@ -111,7 +111,7 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
 
 
 def polynomials(x: Float, order: int) -> Float:
-    """Evaluate the monomials (.., p), 1, x, y and for order 2 x^2, x y, y^2, at positions (.., 2)."""
+    """Evaluate the p monomials 1, x, y and, in order 2, x^2, x y, y^2 (.., p) at positions (.., 2)."""
     one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
     quadratic = (first * first, first * second, second * second) if order == 2 else ()
     return np.stack([one, first, second, *quadratic], axis=-1)
@@ -137,7 +137,7 @@ def gathered(place: Int, values: Float, size: int) -> Float:
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """Solve for polynomial coefficients (n, p, k) from moments (n, p, p) and sums (n, p, k)."""
+    """Solve moments a = sums for coefficients a (n, p, k); moments (n, p, p) get RIDGE, sums are (n, p, k)."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))
@@ -159,13 +159,13 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Build tractions from the mean side normals (n, 2), without vertices at which the normals cancel."""
+        """Normalize the `mean` (n, 2) of side normals at vertices; leave out vertices where the normals cancel."""
         length = np.hypot(*mean.T)
         rows = length > NO_NORMAL
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Copy the stresses (vertices, m, k), and match the known tractions at vertices `vertex` (n,).
+        """Copy `stress` (vertices, m, k), and match the known tractions at the vertices `vertex` (n,).
 
         With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
         where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.

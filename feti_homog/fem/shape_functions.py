@@ -121,7 +121,7 @@ class MixedElements:
 
     @classmethod
     def of(cls, points: Float, L: Float) -> MixedElements:
-        """Compute the gradients and weights of mixed elements with the nodes (e, 6, 2)."""
+        """Compute gradients, weights and projections of mixed elements with nodes (e, 6, 2) and stiffness L (v, v)."""
         g, w = gradients(points, with_bubble=True)
         linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
         mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
@@ -129,7 +129,7 @@ class MixedElements:
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
-        """Compute the nodal stiffness (e, 6, 6, 4) without bubble and pressure, with (i, j) flat."""
+        """Compute the nodal stiffness (e, 6, 6, 4), with (i, j) flat; bubble and pressure are eliminated."""
         K, n = self._stiffness(slice(None)), 2 * BUBBLE
         nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
@@ -152,16 +152,16 @@ class MixedElements:
         return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
 
     def stress(self, u: Float) -> Float:
-        """Compute stresses 2 mu eps + p, (e, q, 3, k), under displacements (e, 7, 2, k)."""
+        """Compute stresses 2 mu eps + p I, (e, q, 3, k), under displacements (e, 7, 2, k)."""
         first, shear = self.lame
         stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """Compute the stiffness rows (e, 2n, 14) of n shape functions, with the bubble:
+        """Compute the stiffness rows (e, 2n, 14) of n shape functions; the last two columns belong to the bubble:
 
-        mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
+        K_(a i)(b j) = int mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """
         (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
         flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
@@ -197,7 +197,7 @@ class PointFields:
 
 
 def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute the fields in elements, mixed if `is_mixed`, with nodes and displacements (e, a, 2), L (3, 3)."""
+    """Compute the fields in elements, mixed if `is_mixed`, from nodes `points` and u (e, a, 2), and L (3, 3)."""
     if not is_mixed:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
@@ -229,9 +229,8 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
 
     Args:
         points, u: (e, a, 2) element nodes and their displacements.
-        L: (3, 3) stiffness.
+        L, is_mixed: (3, 3) stiffness, and whether the elements have a bubble and a pressure.
         moved, changed: (e, a, 2) dx and du.
-        is_mixed: whether the elements have a bubble and a pressure.
     """
     fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
     grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)

@@ -42,9 +42,8 @@ class RecoveredStress:
     """The element stresses and the recovered stresses under k loads, in subdomains of one phase.
 
     Attributes:
-        points: (n, 2) positions of the plane nodes.
+        points, node_class: (n, 2) positions and (n,) classes of the plane nodes.
         triangles: (e, 3 or 6) plane nodes of the elements.
-        node_class: (n,) class of every plane node.
         L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) macroscopic strains and other loads.
@@ -151,7 +150,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; p = 1 in order 1."""
+        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; only of 1 in order 1."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
@@ -169,7 +168,7 @@ class RecoveredStress:
         return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
 
     def patch_sums(self) -> tuple[Float, Float]:
-        """Sum the moments (vertices, p, p) and stress moments (vertices, p, m k) around every vertex."""
+        """Sum w P^T P (vertices, p, p) and w P^T sigma (vertices, p, m k) about every vertex, for `polynomials` P."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for chunk in self.elements:
             corners = self.points[self.triangles[chunk.part, :3]]
@@ -181,7 +180,7 @@ class RecoveredStress:
         return moments, sums
 
     def _with_shared(self, fits: Float) -> Float:
-        """Replace the fits (vertices, p, m k) at shared vertices by the shared fits, in place."""
+        """Replace the fits (vertices, p, m k) at shared vertices by the shared fits, in place; return the fits."""
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
@@ -198,11 +197,10 @@ class RecoveredStress:
             result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
         return result.reshape(*points.shape[:2], *shape)
 
-    def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
-        """Compute the energy of the difference ds between recovered and element stresses.
+    def difference(self) -> tuple[Float, Float]:
+        """Compute the energy products of the difference ds between recovered and element stresses.
 
-        Returns:
-            int ds_i : S : ds_j (k, k), S the flexibility; its diagonal (e, k) by element, (0, k) if not `with_shares`.
+        Returns int ds_i : S : ds_j (k, k), S the flexibility, and its diagonal (e, k) by element.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]
@@ -223,6 +221,5 @@ class RecoveredStress:
             difference = (difference.reshape(-1, m * k) @ root).reshape(difference.shape)
             flat = difference.reshape(-1, k)
             total += flat.T @ flat
-            if with_shares:
-                shares.append(np.einsum("qemk,qemk->ek", difference, difference))
+            shares.append(np.einsum("qemk,qemk->ek", difference, difference))
         return total, np.concatenate(shares)

@@ -38,7 +38,7 @@ class InfluenceSolutions:
         self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Solve for loads (k, v) by influence columns, or return None if F lambda is due.  Collective.
+        """Solve for loads `strains` (k, v) by influence columns, or return None if F lambda is due.  Collective.
 
         F lambda is due if the quota is used up, if the jump of a load on the active rows is at most LEAST_FOLLOWED
         times its jump on all rows, or if influence columns and coarse space disagree about the number of free motions.
@@ -73,10 +73,10 @@ class InfluenceSolutions:
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Compare solutions by F lambda with the prediction, and renew the quota; `d` as in `solutions`.  Collective.
+        """Compare solutions by F lambda with predictions, and renew the quota; `d` is as in `solutions`.  Collective.
 
         The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
-        on active rows.  If an error exceeds MOST_FOLLOWED_ERROR and twice the rounding, the answer is computed anew.
+        on active rows.  An error above MOST_FOLLOWED_ERROR and twice the rounding of F lambda renews the answer.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.

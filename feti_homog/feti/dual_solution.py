@@ -21,7 +21,7 @@ class DualSolution:
 
     Attributes:
         strain: (v,) load E: the macroscopic strain, then the other loads of the problem; with tractions on the sides
-            (v + m,), followed by the stress Sigma of the tractions.
+            (v + m,), followed by the m components of their stress Sigma.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on inactive rows.
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
@@ -103,7 +103,7 @@ class ActiveJumps:
         """Compute amplitudes alpha, jumps and residuals for multipliers `lam` (owned rows, k).
 
         `strains` (k, v) are the loads E; `jump` (owned rows, k) is d E - (F + C) lam, without rigid-body motions; the
-        residuals are relative to `scale` (k,).
+        residuals are relative to `scale` (k,).  `iterations` and `reason` are stored in the solutions.
         """
         alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
         if self.natural.kernel_dimension:
@@ -124,7 +124,8 @@ class ActiveJumps:
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
         """Return the sum of k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
 
-        If all have alpha, the sum has alpha, the most iterations and a new residual, else the numbers of the first.
+        If all solutions have alpha, the sum has alpha, the most iterations, the least reason and a new residual; else
+        alpha is None, and the other numbers are from the first solution.
         """
         triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
         strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
@@ -155,8 +156,8 @@ class ActiveJumps:
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
-    For u = K+ f (boundary dofs, v) and the machine precision eps, the estimate is B K+ (eps diag(K) |u|) with random
-    signs: jumps under forces as large as the rounding of K u.  A soft subdomain between stiff ones moves far then.
+    For `displacement` u = K+ f (boundary dofs, v) and machine precision eps, the estimate is B K+ (eps diag(K) |u|)
+    with random signs: jumps under forces as large as the rounding of K u, which may move soft subdomains far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner, M^-1 or H_0 of `coarse.adaptive`, P the projector of `coarse.natural`; F includes springs, C.
+H is the preconditioner (M^-1, H_0 or an exact inverse), P the projector of `coarse.natural`; F includes springs, C.
 
 A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
 iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.

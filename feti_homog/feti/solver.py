@@ -47,7 +47,7 @@ class FetiSolver:
         interface_operators: S and S+ of the local subdomains.
         intact_compliance: (owned rows,) C of the intact springs.
         operator: F + C.
-        preconditioner: M^-1, or H_0 with the adaptive coarse space.
+        preconditioner: M^-1, or H_0 with the adaptive coarse space, or an exact inverse H.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         natural: rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
@@ -144,7 +144,10 @@ class FetiSolver:
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """Compute area Sigma (v,) = torn_stiffness E + d^T lam and, if pulled, -int u* (x) n ds (m,).  Collective."""
+        """Compute the stress integral torn_stiffness E + d^T lam (v,) of a solution.  Collective.
+
+        With tractions on the sides, the entries -int u* (x) n ds (m,) come after the stress integral.
+        """
         local = self.d.T @ solution.lam
         if self.is_pulled and (alpha := self.completed(solution).alpha) is not None:
             local = local + self._pushes.T @ alpha[self.natural.owned_modes]
@@ -182,7 +185,7 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return the loads (v + m, v) of unit strains: E and, with tractions, the Sigma for which E is the mean strain.
+        """Return loads (v, v) of unit strains, or (v + m, v) with tractions Sigma for which E is the mean strain.
 
         Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
         """
@@ -198,15 +201,15 @@ class FetiSolver:
         return self._closure
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve the dual problem for one load (v,) from `start` (owned rows,), like `solve_many`.  Collective."""
+        """Solve the dual problem for a load `strain` (v,) from `start` (owned rows,) by `solve_many`.  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
         """Solve the dual problems for k loads together.  Collective.
 
         One Krylov method iterates on all loads, scaled to unit jumps; `DualSolution.reason` reports convergence.
-        With tractions on the sides, the solutions that gave `closure` are superposed; raises like `closure`.  With
-        influence columns, raises like `InfluenceSolutions.record`.
+        For loads (k, v) and tractions on the sides, the solutions that gave `closure` are superposed; raises like
+        `closure`.  With influence columns, raises like `InfluenceSolutions.record`.
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
@@ -258,14 +261,14 @@ class FetiSolver:
         return solution if solution.alpha is not None else self.jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """Compute the boundary displacements u* (boundary dofs,), Eq. (34); see `completed`.  Collective."""
+        """Complete a solution, and compute the boundary displacements u* (boundary dofs,), Eq. (34).  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.R @ solution.alpha[self.natural.owned_modes])
 
     def displacement(self, solution: DualSolution) -> Float:
-        """Compute the displacements u* (local dofs,), Eq. (34).  Collective; the first call may factor interiors."""
+        """Complete a solution, and compute u* (local dofs,), Eq. (34); may factor interiors.  Collective."""
         u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
         return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
 

@@ -133,9 +133,10 @@ class SolverPlan:
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
     """Choose the preconditioner and the coarse space from sizes and options.
 
-    If all operators are dense, and no option requests the adaptive space, the default is influence columns for a thin
-    body, or for at least `influence_applications` products and at most `assembled_schur_dofs` shared dofs; else, if no
-    option requests a coarse space, BONDED for `one_each` and 1 to `dense_boundary_dofs` shared dofs; else "dirichlet".
+    With dense operators and no option for the adaptive space, the default is influence columns if a body is thin, or if
+    at least `influence_applications` products follow and at most `assembled_schur_dofs` dofs are shared.  Otherwise,
+    with dense operators and no option for a coarse space, the default is BONDED if `one_each` holds and 1 to
+    `dense_boundary_dofs` dofs are shared.  In all other cases it is "dirichlet".
     With "dirichlet", the coarse space is adaptive on request, or if bodies are cut and all subdomains are searchable.
 
     Raises:
@@ -163,10 +164,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def construct(name: str, operators: InterfaceOperators) -> Preconditioner:
-    """Construct the preconditioner that `name` selects, as in `SolverPlan`.  Collective.
-
-    The modules of `feti.exact` are imported only where a preconditioner needs them.
-    """
+    """Construct the preconditioner `name`, as in `SolverPlan`; import `feti.exact` only if needed.  Collective."""
     if name == "influence":
         from feti_homog.feti.exact.exact_inverse import ExactInverse
 
@@ -183,7 +181,7 @@ class SolverParts:
     """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
-        operators, preconditioner, natural: boundary operators; M^-1 or H_0; rigid-body motions, G and P.
+        operators, preconditioner, natural: boundary operators; M^-1, H_0 or H; rigid-body motions, G and P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
         method: names of preconditioner and coarse space for the summary.

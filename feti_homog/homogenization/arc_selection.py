@@ -41,7 +41,7 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    at least LEAST_SIZE, at most `interface_size`.  With several openings it may be larger, so that tips add at most
+    at least LEAST_SIZE, at most `interface_size`.  With several openings h_t may be larger, so that tips add at most
     TIP_TRIANGLES times the triangles of the mesh.  In paths and envelopes tips move: only `tip_size` sets a size there.
     """
     cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
@@ -73,7 +73,7 @@ class EstimatedNodes:
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
         """Place nodes on the chords that may debond, except vertices that never part.
 
-        `pairs` are as in `share_entities`; `numbers` (constituents,) are fibre numbers.
+        `pairs` are as in `share_entities`; fibres have `numbers` (constituents,) and `centres` (constituents, 2).
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
@@ -126,9 +126,9 @@ def checked(
                 if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
                     continue
                 if fibre is not None and fibre not in fibres:
-                    phases = interface.between
-                    kind = "that can debond" if phases is None else f"between {' and '.join(phases)}"
-                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}")
+                    kind = f"between {' and '.join(interface.between)}" if interface.between else "that can debond"
+                    first = ", ".join(map(str, np.unique(fibres)[:3].tolist()))
+                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}; the first with one: {first}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = f"no node of {whose} is within the arc of {angle} degrees"

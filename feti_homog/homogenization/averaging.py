@@ -4,7 +4,7 @@ A strain E is [E11, E22, gamma12], followed by the other loads of the problem; a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,11 +29,11 @@ class Response:
         strain: (v,) E.
         stress: (v,) Sigma = <sigma>, conjugate to E.
         scale: ratio of the response to `state`.
-        stored: energy per cell area, 1/2 <sigma:eps> from the displacements plus spring energy.
+        stored: energy per cell area, 1/2 <sigma:eps> with springs; if brief, 1/2 Sigma.E minus half the friction work.
         in_springs: spring energy per cell area; without friction 1/2 sum lam^2 C / area.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on this rank's subdomain boundaries; (0,) if brief.
-        checks: relative error in each law.
+        checks: relative error in each law; if brief, only of the contact certificate.
             `strain`: <eps> = E, Eq. (3), where <eps> includes the opening of debonded faces and the strain of voids,
             both from boundaries; in a cell of one subdomain this error shows whether the mesh is closed.
             `hill`: <sigma:eps> = Sigma:E, Eq. (8), with the spring energy and the friction work on debonded faces;
@@ -46,6 +46,7 @@ class Response:
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
+        inside: (dofs,) u* in this rank's parts; (0,) before `recovered_fields.recovered`.
     """
 
     strain: Float
@@ -59,6 +60,7 @@ class Response:
     counts: dict[str, int]
     damage: Float
     shares: Float | None = None
+    inside: Float = field(default_factory=lambda: np.zeros(0))
 
     @property
     def leading(self) -> str:
@@ -113,7 +115,7 @@ class Homogenization:
         """Solve the unit-cell problem under each strain, and average.  Collective.
 
         Strains are (k, v); `bonds` has debonded nodes and a first guess of contact; `starts` are initial multipliers.
-        Raises ConvergenceError if a solve breaks down and leaves no numbers.
+        Raises like `response` and `ContactProblem.equilibrium`.
         """
         if self.interface.is_linear(bonds.status):
             return [self.response(state, 1.0) for state in self.interface.equilibria(strains, bonds, starts)]
@@ -124,7 +126,7 @@ class Homogenization:
         """Average an equilibrium, multiplied by `scale`.  Collective.
 
         If `brief`, a state without kernel amplitudes is averaged from its multipliers, and only the contact is checked.
-        Raises ConvergenceError if the numbers of the state are not finite.
+        Raises ConvergenceError if the residual of the state is not finite, because the Krylov method broke down.
         """
         if not np.isfinite(state.solution.residual):
             raise ConvergenceError(
@@ -229,7 +231,7 @@ class Homogenization:
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest relative contribution of inner nodes to int eps*, 0 for closed meshes.  Collective."""
+        """The largest weight of inner nodes in int eps*, relative to sqrt(area); 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))

@@ -53,7 +53,7 @@ def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[str, ...]:
-    """List remarks on a mesh: polygons, interfaces without effect, soft springs, and nodes that never part.
+    """List remarks on a mesh: polygons, exchanged phases, idle interfaces, soft springs, and nodes that never part.
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
@@ -88,7 +88,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
 
 def cut_off(mesh: CoarseMesh, refine: int) -> float:
-    """Return the fraction of round fibres that straight edges cut off after `refine` halvings; 0 without arcs."""
+    """Return the area fraction that straight edges cut off round fibres after `refine` halvings; 0 without arcs."""
     curves = mesh.ellipses[mesh.arc_circle]
     ends = np.linalg.solve(curves.frames, (mesh.points[mesh.arc_edges] - curves.centres[:, None]).swapaxes(1, 2))
     angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**refine
@@ -97,7 +97,7 @@ def cut_off(mesh: CoarseMesh, refine: int) -> float:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain a subdomain count that differs from the requested number in one line; () without a difference."""
+    """Explain in one line why the subdomain count differs from the requested number; () without a difference."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -110,7 +110,10 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on sides that are not periodic, or else on order, seed, teeth of `bonds` (0: unknown), fibres."""
+    """List remarks on sides that are not periodic, else on order, seed, teeth and fibre fraction.
+
+    `bonds` is the number of bonds with teeth, 0 if unknown.
+    """
     cell, lines = case.cell, tuple[str, ...]()
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
@@ -118,7 +121,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     if case.analysis.type == "envelope" and cell.order == 1:
         lines = ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
     if cell.geometry == "random" and case.output.mesh_error and case.analysis.type not in ("load", "path", "angle"):
-        lines += (f'[cell] seed = {cell.seed}: "+-" has mesh errors, no scatter, as realisations in [sweep] have',)
+        lines += ('[cell] geometry = "random": "+-" of one cell has mesh errors; its scatter: realisations in [sweep]',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
@@ -129,10 +132,8 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return lines
     fraction = cell.matched.fibre_fraction
-    remark = (
-        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; distances between "
-        "neighbours are the same in diameters"
-    )
+    remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"
+    remark += "; distances between neighbours are the same in diameters"
     return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
 
 
@@ -160,18 +161,24 @@ def longest(ends: Float) -> float:
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
-def process_zone(case: Case) -> float | None:
-    """Return the least process zone length E' G_Ic / sigma_c^2.
+def process_zone(case: Case) -> tuple[float, float]:
+    """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
-    The result is None unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
+    Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
     are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
-    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.
+    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds with 100 times
+    the strengths of others hold, without a process zone.
     """
-    lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
+    pure = []
     for bond in case.interfaces:
-        pure = (bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)
-        lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
-    return min(_modulus(case, phase) for phase in case.materials) * min(lengths) if lengths else None
+        pure += [(bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)]
+        if bond.toughness and bond.normal_stiffness:
+            pure.append((bond.toughness, math.sqrt(2 * bond.normal_stiffness * bond.toughness)))
+    pairs = [(toughness / strength**2, strength) for toughness, strength in pure if toughness and strength]
+    limit = 100.0 * min((strength for _, strength in pairs), default=math.inf)
+    length, strength = min((pair for pair in pairs if pair[1] < limit), default=(math.inf, math.inf))
+    # Conductors have no modulus.
+    return min((_modulus(case, phase) for phase in case.materials if pairs), default=1.0) * length, strength
 
 
 def _modulus(case: Case, phase: str) -> float:
@@ -181,30 +188,26 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
-    """List warnings about cohesive laws, and process zones of unlikely lengths or that elements do not resolve.
+    """List warnings about cohesive laws, unlikely process zones, and elements that do not resolve a process zone.
 
     Args:
         width: cell width.
         edge: longest coarse edge between phases, which `refine` halves.
         radii: radii of fibres, NaN unless round.
     """
-    length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
-    if length is None:
+    (length, strength), softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
+    if math.isinf(length):
         return lines
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
     ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
-    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # units
+    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # else perhaps wrong units
     zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" * doubt
     if edge / 2**case.cell.refine <= resolved * length:
         return [f"{law}: the process zone is {zone}"] * doubt + lines
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
     if not softens:
-        # The bonds of the shortest process zone break at this traction in pure opening.
-        pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
-        stiffness, toughness = max(pair for pair in pairs if all(pair))
-        strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
-        zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}"
+        zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength:.3g}"
     limit = f"elements should be at most {'a third' if softens else 'half'} as long"
     refine = math.ceil(math.log2(edge / (resolved * length)))
     # Rounded down to two digits.

@@ -34,7 +34,7 @@ class SharedVertices:
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the vertices and edges that several pieces share.  Collective."""
+        """Find the vertices and edges that several pieces share; `meshes` has pieces and their mesh.  Collective."""
         self._comm = comm
         # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
         # body, entity and position, and the vertex classes (e, m) along these edges.
@@ -81,7 +81,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count the copies of each row (n, 3) in all meshes, and mark the first copy with 1: (n, 2).  Collective."""
+        """Count, for each part (n, 3), the copies of its rows, and mark first copies with 1: (n, 2).  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -113,7 +113,8 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
     """Find the triangles and edges along the border of a piece.
 
     `classes` (t, q) are the lattice node classes of all triangles.  Return the triangle (e,) at each border edge, the
-    position (e,) of the edge in the triangle, and the node classes (e, intervals + 1) along the edge.
+    position (e,) of the edge in the triangle, and the node classes (e, intervals + 1) along the edge, in the same order
+    on both sides of a cut.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
@@ -130,7 +131,7 @@ def fits_across_cuts(
     """Fit recovered stresses at vertices on or next to cuts, over all pieces.  Collective.
 
     Returns:
-        For each mesh index, the vertex classes (n,) and their fits: p coefficients (n, p, m k) of m stresses, k loads.
+        For each mesh index, the vertex classes (n,) and fits (n, p, m k): p coefficients of m stresses under k loads.
     """
     pieces = zip(shared.meshes, shared.classes, shared.sides, shared.is_first, strict=True)
     strips = [_Strip.of(bodies[mesh], classes, sides, first) for mesh, classes, sides, first in pieces]
@@ -194,10 +195,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[index], vector[index], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Pair the vertices on the body boundary with their neighbours.
-
-        `at_boundary` (n,) marks the shared vertices on the boundary.
-        """
+        """Pair vertices on the body boundary with neighbours; `at_boundary` (n,) marks shared boundary vertices."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary

@@ -82,7 +82,7 @@ class CellSummary:
 
     @property
     def coatings(self) -> Float:
-        """The coating thicknesses (fibres,), 0 without a coating, NaN if not round."""
+        """The coating thicknesses (fibres,), 0 without a coating, NaN if a thickness varies."""
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     @property
@@ -184,7 +184,7 @@ def distribute(
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """Summarize a tiled cell with these numbers of subdomains and coarse triangles."""
+    """Summarize the tiled cell `noded`, with its numbers of subdomains and coarse `triangles`."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     solid = np.flatnonzero((inside := regions.constituent[:-1]) >= 0)
     circle = solid[np.unique(inside[solid], return_index=True)[1]]
@@ -224,7 +224,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
 ) -> partition.Partition | None:
-    """Cut the cell across materials; return None if the policy or METIS prevents the cut."""
+    """Cut the cell across materials; return None if the case, the policy or METIS prevents the cut."""
     elements, corners = torus.mesh.triangles.shape
     dofs, is_image = elements * (corners - 2) * lattice.intervals**2, corners == 4
     pieces = policy.across_pieces(dofs, n_ranks, is_image) if partition_policy.can_be_cut_across(case) else 0
@@ -240,10 +240,7 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the distance between the fibres and the matched table; None without a table.
-
-    Fibres have centres (n, 2) and radii (n,).
-    """
+    """Return the distance of fibres, `centres` (n, 2) and `radii` (n,), from the matched table; None without it."""
     if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours

@@ -52,7 +52,7 @@ class CrackExtension:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the derivative of the subdomain energy by the angle of a turning crack tip.
+        """Return the derivative of the subdomain energy with respect to the angle by which a crack tip turns.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.
@@ -207,7 +207,7 @@ class EnergyReleaseRates:
         return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """Return the work that closes each crack, and the closed lengths (t,).
+        """Return the work that closes each crack, from forces and jumps (n, 2), and the closed lengths (t,).
 
         The work is `closing_work` (t, 2) in opening and in shear.  A closed length is the larger of MODE_LENGTH times
         the radius and the length of the element behind the tip.

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from feti_homog.fem import arc_error, local_fits, stress_recovery
 from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.recovered_fields import recovered
 from feti_homog.homogenization.uniform_parts import NONE, UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED
@@ -45,7 +46,7 @@ class EnergyErrors:
         elements: int ds_i : S : ds_j / area, with ds the recovered stresses less the element stresses, plus the
             spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
-        shares: (m, k) contributions of this rank's elements to the diagonal of `elements`; may have no rows.
+        shares: (m, k) contributions of this rank's elements to the diagonal of `elements`.
         least_of_two: least estimate of an error i != j over sqrt(a_i a_j), with a_i = |elements_ii| + |arcs_ii|.
     """
 
@@ -74,13 +75,12 @@ class EnergyErrors:
 
 
 def energy_errors(
-    cell: TornCell, responses: Sequence[Response], contact: bool = False, keep: bool = True, nested: bool | None = None
+    cell: TornCell, responses: Sequence[Response], contact: bool = False, nested: bool | None = None
 ) -> EnergyErrors:
     """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
         contact: whether faces touch.
-        keep: whether later states need the interior factors, and the caller needs `shares`.
         nested: whether to use the coarser mesh; by default the result of `is_nested`.
     """
     k, area = len(responses), cell.summary.area
@@ -89,8 +89,8 @@ def energy_errors(
     fewer = cell.lattice.halvings - lattice.halvings
     sums, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
     of_elements, of_arcs = factors(cell, fewer)
-    for stress, sides in _recovered(cell, responses, keep, lattice):
-        energy, of_each = stress.difference(keep)
+    for stress, sides in _recovered(cell, responses, lattice):
+        energy, of_each = stress.difference()
         sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides)
         shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = distributed_arrays.allreduce_sum(cell.comm, sums) / area
@@ -118,9 +118,9 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether the mesh error follows from a coarser mesh.  Collective.
 
-    Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with fibres other than
-    circles and ellipses or straight sides at voids, and for linear elements without interfaces.  For debonded responses
-    it is true only if the elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
+    Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with straight sides at
+    voids, with fibres other than circles and ellipses, and for linear elements without interfaces.  For debonded
+    responses it is true only if elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
     """
     lattice = cell.lattice
     pieces = (s.submesh for s in cell.subdomains)
@@ -134,12 +134,12 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
 
 
 def _recovered(
-    cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
+    cell: TornCell, responses: Sequence[Response], lattice: ReferenceLattice
 ) -> Iterator[tuple[stress_recovery.RecoveredStress, arc_error.ArcSides]]:
     """Yield the recovered stresses and arc sides by subdomain group.  Collective before the first result.
 
-    On a coarser `lattice` each subdomain has a new equilibrium, with stored factors if `keep`.  Subdomains across
-    materials take the fine displacements at the coarse nodes instead; the estimates are hardly smaller.
+    On a coarser `lattice` each subdomain has a new equilibrium.  Subdomains across materials take the fine
+    displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
@@ -147,25 +147,22 @@ def _recovered(
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
     solved = list[tuple[list[Subdomain] | list[UniformPart], FineMesh, Float, Int]]()
     if is_nested and not across:
-        for interior in cell.nested_interiors if keep else nested_interiors(boundary, cell.lattice, lattice):
+        for interior in nested_interiors(boundary, cell.lattice, lattice):
             displacement = interior.displacement(u, loads)
             position = np.full(displacement.shape[0] * displacement.shape[1], NONE)
             position[interior.fixed] = interior.place
             solved.append((interior.members, interior.mesh, displacement, position))
     else:
-        displacements, firsts = cell.displacements(u, loads, keep), cell.offsets if across else boundary.offsets
-        dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
+        inside = np.stack([response.inside for response in recovered(cell, responses)], axis=1)
+        numbered, position = np.arange(len(inside)) if across else boundary.local_dofs, np.full(len(inside), NONE)
+        position[numbered] = np.arange(len(numbered))
         for group in groups(cell.parts, lattice):
-            parts = [cell.parts[k] for k in group]
+            parts, rows = [cell.parts[k] for k in group], slice(cell.offsets[group[0]], cell.offsets[group[-1] + 1])
             mesh = refinement.joined([part.mesh for part in parts])
-            positions = [np.full(len(part.dofs), NONE) for part in parts]
             if is_nested:
                 mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
-            for k, position in zip(group, positions, strict=True):
-                position[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
-            displacement = np.concatenate([next(displacements)[1] for _ in group])
             shape = -1, parts[0].problem.components, len(responses)
-            solved.append((parts, mesh, displacement.reshape(shape), np.concatenate(positions)))
+            solved.append((parts, mesh, inside[rows].reshape(shape), position[rows]))
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
     for members, mesh, displacement, position in solved:
         first, pieces = members[0], [s.submesh for s in members]
@@ -208,7 +205,7 @@ def boundary_tractions(
     length if the mesh is `nested`, else by the side length, so that uniform stresses give exact tractions.
     """
     forces, lengths = _forces(cell, responses, groups)
-    sums, of_node = list[Float](), np.append(lengths, 0.0)  # at NONE, the last
+    sums, of_node = list[Float](), np.append(lengths, 0.0)  # NONE reads the last entry
     for stress, sides, position in groups:
         ends = stress.node_class[sides.nodes[:, [0, -1]]].ravel()
         half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2

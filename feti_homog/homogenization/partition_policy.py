@@ -28,11 +28,13 @@ MOST_POISSON = 0.45
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
-# Bytes of a rank without degrees of freedom, per degree of freedom, and per multiplier with stored influence columns.
-BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
+# Bytes of a rank without degrees of freedom, per degree of freedom, and per multiplier with stored influence columns;
+# additional bytes per degree of freedom if the run keeps the factors of interiors.
+BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.7e8, 1.0e3, 2.9e4
+INTERIOR_BYTES = 5.1e2
 # Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
-# 31 000 to 271 000 degrees of freedom, estimates are 0.93 to 1.07 times the measured memory; at order 2, 0.85 times.
-FACTOR_BYTES = 2.9e2
+# 31 000 to 271 000 degrees of freedom, estimates are 0.92 to 1.06 times the measured memory.
+FACTOR_BYTES = 9.4e2
 # Additional bytes of a path to complete debonding: for each multiplier of a rank, and for each pair of a multiplier and
 # an influence column; a cell that is factored anew has `INFLUENCE_COLUMNS` columns.  For five paths with 1 to 50 fibres
 # and 120 to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense
@@ -68,8 +70,8 @@ class PartitionPolicy:
         strip_dofs: cells from this size on are halved into strips.  Smaller cells have short boundaries anyway, and the
             irregular cuts of METIS make their estimated mesh errors depend less on the direction.
 
-    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the sizes of bonded bodies,
-    `scripts/benchmark_path` of bodies that may part, and `scripts/benchmark --table small` the last five sizes.
+    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the rules for bonded bodies,
+    `scripts/benchmark_path` the rules for bodies that may part, and `scripts/benchmark --table small` the last five.
     """
 
     piece_dofs: int = 2200
@@ -165,7 +167,14 @@ def applications(case: Case, problem: Problem, across: bool = False) -> int:
     return iterations * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
-def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
+def keeps_interiors(case: Case) -> bool:
+    """Return whether the run recovers many states, which makes the factors of interiors worth their memory."""
+    return case.analysis.type == "angle" or (case.section.is_followed and case.output.fields)
+
+
+def memory(
+    case: Case, nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int
+) -> float:
     """Estimate the memory of the largest rank, in bytes.
 
     Args:
@@ -173,9 +182,10 @@ def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence
         components: displacements at a node in each problem.
         columns: multipliers that have influence columns.
     """
-    in_one_factor = max(components) * max(nodes) if max(subdomains) == 1 else 0
     dofs = sum(components) * max(nodes)
-    return BASE_BYTES + dofs * DOF_BYTES + in_one_factor * FACTOR_BYTES + columns / len(nodes) * COLUMN_BYTES
+    of_interiors, of_cells = keeps_interiors(case) * dofs * INTERIOR_BYTES, max(components) * max(nodes) * FACTOR_BYTES
+    factors = of_cells if max(subdomains) == 1 else of_interiors
+    return BASE_BYTES + dofs * DOF_BYTES + factors + columns / len(nodes) * COLUMN_BYTES
 
 
 def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:

@@ -21,7 +21,7 @@ IN_PLANE, AXIAL_SHEAR, GRADIENT = [0, 1, 5, 2], [4, 3], [4, 3, 2]
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """Return the plane problem and, in generalized plane strain, the axial problem; or conduction alone.
+    """Return the plane problem and, in generalized plane strain, the axial problem; or only conduction.
 
     A temperature is a load of the plane problem if all phases have expansions.
     """
@@ -58,7 +58,7 @@ def is_mixed(case: Case, phase: str) -> bool:
 def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tuple[Float, ...]:
     """Differentiate `law` in each of the `problems`: one or two derivatives (v, v).
 
-    `dC` and `expansion` (6,) are the derivatives of the stiffness and the expansion of the phase.
+    `dC` is the derivative of the phase stiffness, (3, 3) or (6, 6), or conductivity; `expansion` (6,) is d alpha.
     """
     problem = problems(case)[0]
     if problem in (PLANE, CONDUCTION):

@@ -5,7 +5,7 @@ integration points: one point in a linear element, six points in a quadratic ele
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,9 +35,11 @@ class RecoveredFields:
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
-        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; fluxes replace the axial shears.
+        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux replaces
+            the stresses 13, 23 and 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
-            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33 have no entry.
+            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33, and phases in
+            conduction, have no entry.
     """
 
     displacement: list[Float]
@@ -49,8 +51,8 @@ class RecoveredFields:
 class NodalFields:
     """The nodal fields of a state in the plane or the axial problem, with c displacements per node.
 
-    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the plane nodes of the parts; `traction` and `jump` (k, c)
-    at the interface nodes.
+    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the positions y of the parts' plane nodes, with the
+    macroscopic gradient H; `traction` and `jump` (k, c) at the interface nodes.
     """
 
     displacement: Float
@@ -58,11 +60,19 @@ class NodalFields:
     jump: Float
 
 
+def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
+    """Return the responses with u* inside the subdomains.  Collective."""
+    if all(len(response.inside) == cell.offsets[-1] for response in responses):
+        return list(responses)
+    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
+    columns = cell.extended(u, loads).T
+    return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
+
+
 def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> RecoveredFields:
     """Recover the fields of all states, in one pass over the parts.  Collective.
 
-    Args:
-        states: responses of each problem in each state; a problem without a response has zero fields.
+    `states` has the responses of each problem in each state; a problem without a response has zero fields.
     """
     by_problem = [*zip((cell, cell.axial or cell), zip(*states, strict=True), strict=False)]
     u = [np.zeros((torn.offsets[-1], len(states))) for torn, _ in by_problem]
@@ -95,21 +105,10 @@ def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: P
         return NodalFields(np.zeros((n, c)), np.zeros((k, c)), np.zeros((k, c)))
     lam, opening = cell.across_bonds(response.solution, u)
     H, totals = problem.gradient(response.strain[: problem.strains]), [np.zeros((0, c))]
-    for part, offset in zip(cell.parts, cell.offsets, strict=False):
-        of_part = u[offset : offset + len(part.dofs)].reshape(-1, c)
-        totals.append(part.mesh.points @ H.T + of_part[part.mesh.node_class])
+    for part, of_part in cell.by_part(u):
+        totals.append(part.mesh.points @ H.T + of_part.reshape(-1, c)[part.mesh.node_class])
     pair = nodes.row[:, None] + np.arange(c)
     return NodalFields(np.concatenate(totals), lam[pair] / nodes.length[:, None], opening[pair])
-
-
-def error_shares(cell: TornCell, response: Response) -> Float:
-    """Return the contributions (e,) of elements to the error of E . Sigma; NaN without estimates.  Collective."""
-    shares = response.shares
-    if shares is None and cell.case.output.mesh_error:
-        from feti_homog.homogenization.mesh_estimate import energy_errors  # cases may forgo it
-
-        shares = energy_errors(cell, [response]).shares[:, 0]
-    return np.full(sum(len(part.mesh.triangles) for part in cell.parts), np.nan) if shares is None else shares
 
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
@@ -128,15 +127,16 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
 def _stresses(
     cell: TornCell, responses: Sequence[Response | None], out: Float
 ) -> Iterator[tuple[str, stress_recovery.ElementStresses, Float]]:
-    """Yield the phase, points and stresses (2, s, 6, e, q) of each chunk of elements; write u* to `out` (dofs, s).
+    """Yield the phase of each chunk of e elements, the chunk, and its stresses (2, s, 6, e, q).  Collective.
 
-    The second stress array has 0 in place of rounding errors.  States with a response None have 0.  Collective.
+    Writes u* to `out` (dofs, s).  The stresses at the q points come as computed, then with 0 in place of rounding
+    errors; they are 0 in states without a response.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
-    u, all_loads = (np.stack([getattr(responses[k], name) for k in at], axis=1) for name in ("u", "all_loads"))
-    loads = all_loads[: len(cell.solver.problem.loads)]
-    for (part, displacement), offset in zip(cell.displacements(u, all_loads), cell.offsets, strict=False):
-        out[offset : offset + len(displacement), at] = displacement
+    present = recovered(cell, [response for response in responses if response is not None])
+    out[:, at] = np.stack([response.inside for response in present], axis=1)
+    loads = np.stack([response.all_loads for response in present], axis=1)[: len(cell.solver.problem.loads)]
+    for part, displacement in cell.by_part(out[:, at]):
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from the stresses conjugate to strains of displacements.
         rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))

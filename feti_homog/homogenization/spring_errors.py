@@ -29,7 +29,7 @@ class SpringSides:
         lattice: ReferenceLattice,
         period: Float,
     ) -> None:
-        """Find the fibre sides in `parts`; `period` (2,) is the period of the cell.  Collective."""
+        """Find the element sides of fibres in `parts`; `period` (2,) is the period of the cell.  Collective."""
         self._comm, self._jumps, self._order, self._period = neighbours.comm, jumps, lattice.order, period
         self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
         rows = jumps.nodes.bodies[:, 1], jumps.nodes.points, jumps.nodes.normal
@@ -71,7 +71,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """Return the energy errors (k, k) beyond tips, and along sides without the part in `arc_energy`.  Collective.
+        """Return the spring energy errors (k, k) beyond tips, and along sides in addition to `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.

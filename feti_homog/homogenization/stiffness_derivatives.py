@@ -1,13 +1,14 @@
 """Differentiate stiffness and conductivity with respect to constants of the case, without further solves.
 
-Let e_i be the strains and the other uniform loads under the unit load i.  A linear cell of area |UC| has stiffness C,
+Let e_i be the strains and the other uniform loads under the unit load i, and [u]_i the jumps at springs of stiffness k.
+A linear cell of area |UC|, with laws A of the phases, has the stiffness C,
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
 and because the fields make C_ij stationary, dC_ij has dA and dk in place of A and k, exactly for the discrete cell.
 Bodies enter only by the integrals, one per phase.  A cell with contact is linear as long as no face opens or closes.
 
-If all fibres grow, the fibre fraction f changes at the rate d f / d ln R = 2 f, and the stiffness at the rate of the
+If all radii R grow, the fibre fraction f changes at the rate d f / d ln R = 2 f, and the stiffness at the rate of the
 energy on a moving mesh with fixed nodal u - E x.  This is exact for the mesh, however nodes between the fibres move.
 """
 
@@ -23,6 +24,7 @@ from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
+from feti_homog.homogenization.recovered_fields import recovered
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
@@ -48,7 +50,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate the stiffness with respect to all constants, by responses to unit loads.  Collective."""
+    """Differentiate the stiffness with respect to all constants, by unit-load responses of each cell.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
@@ -97,9 +99,9 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the derivatives (k, k) of |UC| C with respect
     to ln R of all fibres, which are 0 unless the case has a fraction in `_fractions`.
     """
-    problem, all_loads = cell.solver.problem, np.stack([response.all_loads for response in responses], axis=1)
-    loads = all_loads[: len(problem.loads)]
-    boundary = np.stack([response.u for response in responses], axis=1)
+    problem = cell.solver.problem
+    loads = np.stack([response.all_loads for response in responses], axis=1)[: len(problem.loads)]
+    inside = np.stack([response.inside for response in recovered(cell, responses)], axis=1)
     m, (v, k) = problem.strains, loads.shape
     # T maps [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))
@@ -107,7 +109,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for s, displacement in cell.displacements(boundary, all_loads):
+    for s, displacement in cell.by_part(inside):
         u = displacement.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
@@ -127,8 +129,8 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 class _Fields:
     """The fields in e elements at q points under k loads.
 
-    In mixed elements the energy is also stationary in the bubble; with the pressure lambda Pi div u, its density is
-    the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
+    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
+    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
 
     Attributes:
         gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
@@ -170,7 +172,7 @@ class _Fields:
         """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V.
 
         At fixed displacements the derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with
-        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the other loads.
+        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the loads after the m strains.
         """
         (e, q, _, c, k), m = self.slopes.shape, problem.strains
         grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
@@ -197,7 +199,7 @@ def _strains(slopes: Float, problem: Problem) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """Return int f f^T (n, n) for fields (e, q, n)."""
+    """Return int f f^T (n, n) for fields f (e, q, n) with integration weights (e, q)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 

@@ -42,10 +42,8 @@ def place_nodes(
 ) -> gmsh_mesher.NodedCell | CoarseMesh | None:
     """Place nodes on the lines of the cell.  Collective.
 
-    Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.
-
-    Raises:
-        CaseError, MeshError: on every rank, as in `begin_mesh`.
+    Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.  Raises CaseError and MeshError
+    on every rank, as in `begin_mesh`.
     """
     cell = mpi_errors.on_root_only(comm, begin_mesh, case, policy)
     unmeshed = cell if isinstance(cell, gmsh_mesher.UnmeshedCell) else None
@@ -91,8 +89,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
 def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
     """Fill the tiles on all ranks, and join the mesh on rank 0; None on others.  Collective.
 
-    Raises:
-        MeshError: on every rank, if a rank cannot fill a tile.
+    Raises MeshError on every rank if a rank cannot fill a tile.
     """
     tiles = cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else ()
     gathered = distributed_arrays.gather(comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, comm)))
@@ -124,7 +121,7 @@ def can_be_torn_by_tiles(
     """Return whether the ranks can cut the cell without the whole mesh.
 
     Arc tips, bodies cut by the sides, a given subdomain count, which may be below the tile count, and cells probably
-    small enough for cuts across materials need the whole mesh on one rank.  A user's mesh is on one rank already.
+    small enough for cuts across materials need the whole mesh on one rank, like a user's mesh or a single tile.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -142,8 +139,7 @@ def tear_by_tiles(
 ) -> RankShare:
     """Tear a cell by its tiles, and return this rank's part.  Collective.
 
-    Raises:
-        CaseError, MeshError: on every rank, as in `tiled_cell` and `tile_filling.fill`.
+    Raises CaseError and MeshError on every rank, as in `tiled_cell` and `tile_filling.fill`.
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
@@ -181,7 +177,10 @@ def tear_by_tiles(
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
-    """Cut this rank's triangles (m,) into subdomains (m,), numbered by constituent, then by tile."""
+    """Cut this rank's triangles (m,) into subdomains (m,), numbered by constituent, then by tile.
+
+    `tile` is (m,), `pieces_per_triangle` (constituents,); `longest` is the longest edge in the cell.
+    """
     a, b, _ = torus.sides
     within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
     label = periodic_topology.components(len(tile), a[within], b[within])

@@ -37,7 +37,7 @@ class UniformPart:
     Attributes:
         place: subdomain number on this rank.
         submesh, mesh: coarse triangles and refined mesh of the part.
-        dofs: (cn,) degrees of freedom of the part in the subdomain.
+        dofs: (k,) degrees of freedom of the part in the subdomain.
         L, problem: as in `Subdomain`.
         is_mixed: whether each element has a bubble and a pressure.
     """
@@ -77,7 +77,7 @@ def nodes_of_parts(s: Subdomain) -> int:
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Return the mesh restricted to coarse triangles (t,), and the original numbers (c,) of its classes."""
+    """Return the mesh of the coarse triangles `members` (t,), and the original numbers (c,) of its classes."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
     numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
@@ -139,7 +139,7 @@ class NestedInterior:
         mesh: joined mesh of the subdomains, with c displacements per node.
         fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
-        interior: the free displacements.
+        interior: factor for the free displacements.
         loads: (free, v) unit load forces Q on free displacements; None without voids and prescribed side tractions.
     """
 

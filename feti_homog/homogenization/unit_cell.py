@@ -82,16 +82,19 @@ class TornCell:
         """The operator that finds the multipliers between parts.  Collective when first read."""
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
-    def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its displacements u*, extended from the boundary displacements.
+    def extended(self, u: Float, loads: Float) -> Float:
+        """Extend boundary displacements u (boundary dofs, k) to u* (dofs, k) in all parts, under loads (v, k)."""
+        inside, place, of_place = np.empty((self.offsets[-1], u.shape[1]), order="F"), -1, np.zeros(0)
+        keep = partition_policy.keeps_interiors(self.case)
+        for part, of_part in self.by_part(inside):
+            if part.place != place:
+                place, of_place = part.place, self.solver.extended(part.place, u, loads, keep)
+            of_part[:] = of_place[part.dofs]
+        return inside
 
-        `u` is (boundary dofs, k), `loads` are (v, k), and u* is (dofs, k); `keep` stores the factors.
-        """
-        number, extended = -1, np.zeros(0)
-        for part in self.parts:
-            if part.place != number:
-                number, extended = part.place, self.solver.extended(part.place, u, loads, keep)
-            yield part, extended[part.dofs]
+    def by_part(self, u: Float) -> Iterator[tuple[UniformPart, Float]]:
+        """Return each part with its rows of displacements u (dofs, ...)."""
+        return zip(self.parts, np.split(u, self.offsets[1:-1]), strict=False)
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
         """Return the multipliers and openings between parts.  Collective.
@@ -156,11 +159,6 @@ class TornCell:
         often = not locks(self.subdomains, self.comm) and self.lattice.halvings >= uniform_parts.REFINED_OFTEN
         return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
-    @cached_property
-    def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
-        """The interiors of this rank's subdomains on the coarser mesh.  Collective when first read."""
-        return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
-
     def debonded(self, opening: float | None) -> Bool:
         """Return the mask (k,) of this rank's initially debonded nodes; arcs without angle take `opening` degrees."""
         nodes = self.solver.jump_operator.nodes
@@ -203,7 +201,7 @@ def tear(
 ) -> TornCell:
     """Tear the cell of a case, and factor the subdomains.  Collective.
 
-    Raises CaseError and MeshError, on every rank, like `tile_tearing.cut`; `progress` reports the stages.
+    Raises on every rank, like `tile_tearing.cut` and `solver_plan.build`; `progress` reports the stages.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields

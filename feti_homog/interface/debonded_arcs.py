@@ -39,7 +39,7 @@ class InterfaceChains:
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
 
     def tips(self, status: Status) -> CrackTips:
-        """Return the crack tips for node states (n,): bonded nodes with exactly one debonded neighbour."""
+        """Return the crack tips for node states (n,): bonded nodes between a bonded and a debonded neighbour."""
         has_two = self.neighbours[:, 0] >= 0
         debonded = (status != BONDED)[self.neighbours] & has_two[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
@@ -112,14 +112,17 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """Return directions (k,) in [-180, 180] of periodic points (k, 2) about fibre centres; NaN without a centre."""
+    """Return directions (k,) in [-180, 180] of points (k, 2) about the centres of their fibres.
+
+    `fibre` (k,) has indices in `centres` (n, 2); a NaN centre gives NaN.  `period` (2,) is the period of the cell.
+    """
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
-    """Find the tips that a mesh moves to a vertex at most `limit` degrees away.
+    """Return the tips, as `MovedTips`, that a mesh moves to a vertex at most `limit` degrees away.
 
     `marks` are tips from the function `tips`; vertices lie on fibres `fibre` (k,), numbered from 1, in directions (k,).
     """
@@ -167,10 +170,7 @@ def _end(arc: interface_section.Arc, half: float) -> float:
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults in debonded arcs of the interface `label`.
-
-    `centres` (fibres, 2) are NaN for fibres without a centre.
-    """
+    """List the faults in debonded arcs of the interface `label`, for fibre `centres` (n, 2), NaN without a centre."""
     messages = []
     for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -105,9 +105,10 @@ class LoadScales:
 
     Attributes:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
-        least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads.
+        least_bonded_stiffness: (v, v) Reuss' bound <L^-1>^-1 for strains, <L> for other loads, 0 between both.
         largest_stiffness: largest entry of Reuss' bound.
-        bound_ratio: least ratio of Reuss' to Voigt's bound for strains, and of a strain in `acting` to `asked`.
+        bound_ratio: least eigenvalue of Reuss' bound relative to Voigt's bound for strains; `acting` raises strains to
+            this fraction of `asked`.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
         longest: (k,) largest tributary length on the interface of each node.
@@ -146,14 +147,17 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return the largest of `values` (k,) on each node's interface and all ranks, at least 0.  Collective."""
+        """Return for each node the largest of `values` (k,) on its interface and all ranks, at least 0.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return np.asarray(largest[inner])
 
     def bond_stress(self, loads: Float) -> Float:
-        """Return the scale of the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n)."""
+        """Return the scale of the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n).
+
+        This is the largest strain of `imposed_strain` times the stiffness of the softer body and the springs in series.
+        """
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
@@ -214,8 +218,7 @@ class LoadScales:
     def imposed_strain(self, loads: Float) -> Float:
         """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell.
 
-        Entries after the first v, stresses of cells with tractions on the sides, follow from the first v and do not
-        count.
+        Entries after the first v, the stresses of tractions on the sides, follow from the first v and do not count.
         """
         return np.asarray(self._strains @ np.abs(loads[: self._strains.shape[1]]))
 
@@ -259,8 +262,8 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     """Mark strains (v,) under prescribed stresses that a motion without stiffness changes.  Collective.
 
-    Such a motion only opens debonded faces: rigid motions close the jumps of the torn cell, and the torn bodies bear no
-    stress.  `by_stress` (v,) marks prescribed stresses, `voigt` (v, v) is the stress integral of clamped bodies.
+    Under such a strain, rigid motions of the torn bodies close all active jumps, and the bodies bear no stress: only
+    debonded faces open.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is the cell area times <L>.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from feti_homog.materials.laws import COUPLINGS, ISOTROPY
 from feti_homog.materials.material_forms import PER_TEMPERATURE
-from feti_homog.materials.voigt import EXPANSIONS, THERMAL_STRESSES
+from feti_homog.materials.voigt import EXPANSIONS, IN_PLANE_BLOCK, THERMAL_STRESSES
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Array, Float
 
@@ -95,7 +95,8 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
     The table has Cij of the upper triangle without COUPLINGS, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with
     S = C^-1; in space also the constants of `about_fibres` and, from the stress `heat` (6,) under a unit temperature,
-    normal thermal stresses, free strains and their mean across.  Raises numpy.linalg.LinAlgError if C is singular.
+    normal thermal stresses, free normal strains -S heat and their mean across the fibres.  Raises
+    numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
@@ -131,9 +132,7 @@ def about_fibres(C: Array) -> dict[str, Any]:
     beside m.  The moduli are equal in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
     G_transverse = m, K_transverse = k (Hill 1964).
     """
-    off = C[0, 1] + C[1, 0]
-    k = (C[0, 0] + C[1, 1] + off) / 4
-    m = (C[0, 0] + C[1, 1] - off + 4 * C[5, 5]) / 8
+    k, m = isotropic_part(C[IN_PLANE_BLOCK])
     across = (C[0, 2] + C[1, 2] + C[2, 0] + C[2, 1]) / 4
     E, nu = C[2, 2] - across**2 / k, across / (2 * k)
     E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
@@ -157,16 +156,15 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
     return Moduli(**{name: float(value) for name, value in table.items()}, anisotropy=anisotropy(C))
 
 
-def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Return the bulk and shear moduli k and mu of the isotropic stiffness nearest to a plane stiffness (3, 3).
+def isotropic_part(stiffness: ArrayLike) -> tuple[Any, Any]:
+    """Return the moduli k and mu of the nearest isotropic stiffness, of a real or complex one.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8, nearest in the Frobenius norm.  Both moduli
-    are equal in all axes.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8 for a plane stiffness C (3, 3), nearest in the
+    Frobenius norm of tensors.  Turns of the axes change neither.
     """
-    c = np.asarray(stiffness, dtype=float)
-    bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
-    shear = (c[0, 0] + c[1, 1] - c[0, 1] - c[1, 0] + 4 * c[2, 2]) / 8
-    return float(bulk), float(shear)
+    c = np.asarray(stiffness)
+    off = c[0, 1] + c[1, 0]
+    return (c[0, 0] + c[1, 1] + off) / 4, (c[0, 0] + c[1, 1] - off + 4 * c[2, 2]) / 8
 
 
 def isotropic_stiffness(bulk: float, shear: float) -> Float:
@@ -176,13 +174,13 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3) from the nearest isotropic stiffness, equal in all axes."""
+    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3), in any axes, from the nearest isotropic stiffness."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
 
 def _distance(C: Float, nearest: Float) -> float:
-    """Return the distance ||C - nearest|| / ||C|| of two stiffnesses in the Frobenius norm of tensors."""
+    """Return the relative distance ||C - nearest|| / ||C|| in the Frobenius norm of tensors."""
     scale = _MANDEL[len(C)]
     return float(np.linalg.norm(scale * (C - nearest)) / np.linalg.norm(scale * C))
 
@@ -228,7 +226,7 @@ def is_transversely_isotropic(constants: TransverseIsotropy) -> bool:
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """Return the ranges of the moduli E and G of a stiffness (6, 6) over DIRECTIONS directions n across x3.
+    """Return the ranges of E and G of a stiffness (6, 6) over DIRECTIONS directions n across x3.
 
     1/E = sigma:S:sigma with the compliance S and sigma = n n; 1/G likewise with sigma = n t + t n, where t is normal to
     n and x3.  Raises numpy.linalg.LinAlgError if the stiffness is singular.

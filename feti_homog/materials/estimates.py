@@ -165,18 +165,19 @@ def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Est
 def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
     """Return the shear modulus m* of the medium whose energy a coated fibre does not change.
 
-    Under shear across the fibre, the displacement u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of
-    Muskhelishvili's potentials have two harmonics on a circle, exp(-i t) and exp(3 i t).  As the coated fibre stores
-    the energy of the medium that it replaces, phi has no term 1/z in the medium, and so 2 m* u = -F (Eshelby).  In the
-    matrix with moduli m and k, P = F + 2 m u and kappa_m = 1 + 2 m/k,
+    Under shear across the fibre, the displacement u = u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi)
+    of Muskhelishvili's potentials phi and psi have two harmonics on a circle z = r exp(i t): exp(-i t), with index 1,
+    and exp(3 i t), with index 3.  As the coated fibre stores the energy of the medium that it replaces, phi has no term
+    1/z in the medium, and so 2 m* u = -F (Eshelby).  In the matrix with moduli m and k, P = F + 2 m u and
+    kappa_m = 1 + 2 m/k,
 
         P_1 ~ 1/r,  P_3 ~ r^3,  F_1 - (3 P_3 + P_1)/(kappa_m + 1) ~ r,  F_3 - (P_3 - P_1)/(kappa_m + 1) ~ 1/r^3,
 
     and at the fibre 2 m u = V F.  A homogeneous fibre has V = diag(-m/m_f, m/m_f + 2 m/k_f); springs with
-    q_i = 1/(k_i a) add m [[-(q_n + q_t), 3 (q_n - q_t)], [-(q_n - q_t), 3 (q_n + q_t)]], and m_e of
-    `equivalent_fibre` has m/m_e = V13 V31/(1 + V33) - V11.  With two unknowns y at the fibre, P = A y and F = B y at
-    the outer radius, where P = (1 - m/m*) F: det(A - (1 - m/m*) B) = 0, Christensen and Lo's quadratic, has one
-    positive root m*, because V is indefinite, as for a homogeneous cylinder.
+    q_i = 1/(k_i a) add m [[-(q_n + q_t), 3 (q_n - q_t)], [-(q_n - q_t), 3 (q_n + q_t)]], and m_e of `equivalent_fibre`
+    has m/m_e = V13 V31/(1 + V33) - V11.  With two unknowns y at the fibre, P = A y and F = B y at the outer radius,
+    where P = (1 - m/m*) F: det(A - (1 - m/m*) B) = 0, Christensen and Lo's quadratic, has one positive root m*, because
+    V is indefinite, as for a homogeneous cylinder.
     """
     fibre, c, m = family.constants, family.fraction, matrix.G_transverse
     normal, tangential, _ = (0.0, 0.0, 0.0) if family.springs is None else family.springs.compliances

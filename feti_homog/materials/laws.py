@@ -5,7 +5,8 @@ to a plane of symmetry of every phase, so 23 and 13 couple only with each other.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +16,12 @@ from feti_homog.typing import Float
 
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
-NEEDED: dict[type[material_forms.Elastic], dict[str, tuple[str, ...]]] = {
-    material_forms.Orthotropic: {
-        voigt.PLANE_STRAIN.name: ("E3", "nu13", "nu23"),
-        voigt.GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23"),
-    },
-    material_forms.TransverselyIsotropic: {
-        voigt.PLANE_STRAIN.name: ("E_axial", "nu_axial"),
-        voigt.GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
-    },
-}
-"""Optional constants that each plane state needs."""
 OF_DATA_SHEETS = "axis 3 is along the fibres; for data sheets: E_axial, E_transverse, nu_axial, nu_transverse, G_axial"
+NEEDED: dict[type[Any], tuple[tuple[str, ...], tuple[str, ...], str]] = {
+    material_forms.Orthotropic: (("E3", "nu13", "nu23"), ("G13", "G23"), f"; {OF_DATA_SHEETS}"),
+    material_forms.TransverselyIsotropic: (("E_axial", "nu_axial"), ("G_axial",), ""),
+}
+"""Optional constants that plane strain needs, further ones of generalized plane strain, and a hint, by form."""
 # Relative deviation, due to rounding, up to which a material counts as isotropic or transversely isotropic.
 ISOTROPY = 1e-9
 # Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.
@@ -72,7 +67,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3): q = -k grad T in the cell's axes.  Raises ValueError unless k is given and positive definite."""
+    """Return k (3, 3): q = -k grad T in cell axes.  ValueError unless k is given, symmetric and positive definite."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
@@ -212,7 +207,7 @@ def _positive_definite(name: str, matrix: Float) -> Float:
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Return the compliance (6, 6) as `known_compliance`; ValueError if unstable, or incomplete for the plane state."""
+    """Return the compliance (6, 6) as `known_compliance`; ValueError if unstable."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):
@@ -224,10 +219,6 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
                 limit = f"E_transverse/4 = {material.E_transverse / 4.0:.12g}"
                 fault = f"G_transverse = {material.G_transverse}: expected more than {limit}"
         raise ValueError(f"{fault}; no material is stable otherwise")
-    missing = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
-    if missing:
-        fault = f"{', '.join(missing)}: missing; {state.title} {'needs it' if len(missing) == 1 else 'needs them'}"
-        raise ValueError(f"{fault}; {OF_DATA_SHEETS}" if isinstance(material, material_forms.Orthotropic) else fault)
     if state.is_sheet or voigt.is_positive_definite(compliance[:3, :3]):
         return compliance
     if isinstance(material, material_forms.Orthotropic):
@@ -236,6 +227,18 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
     limit = wording.limit_in_words((1.0 - transverse_ratio(material)) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
     words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
     raise ValueError(f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise")
+
+
+def missing_constants(form: type[Any], names: Collection[str], plane: str) -> list[str]:
+    """List the optional constants that a mechanical plane state needs and `names` lack, one line a fault."""
+    state, faults = voigt.PLANE_STATES[plane], []
+    if form is material_forms.TransverselyIsotropic and not {"nu_transverse", "G_transverse"} & {*names}:
+        faults.append("nu_transverse, G_transverse: missing; expected one")
+    of_strain, of_space, hint = NEEDED.get(form, ((), (), ""))
+    needed = of_strain + of_space if state.is_spatial else () if state.is_sheet else of_strain
+    if absent := [name for name in needed if name not in names]:
+        faults.append(f"{', '.join(absent)}: missing; {state.title} needs {'it' if len(absent) == 1 else 'them'}{hint}")
+    return faults
 
 
 def known_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic) -> Float:
@@ -270,7 +273,7 @@ def _numbers(*constants: float | None) -> list[float]:
 
 
 def contrast_lines(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[list[str], list[str]]:
-    """Return the faults and the warnings about the contrast between phases, of stiffness or conductivity."""
+    """Return faults and warnings about contrasts of stiffness or conductivity.  Raises ValueError as `stiffness_of`."""
     noun = "conductivities" if voigt.PLANE_STATES[plane].is_scalar else "stiffnesses"
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}

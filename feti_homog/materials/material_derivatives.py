@@ -34,7 +34,7 @@ class LawChange:
     Attributes:
         name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
         value: value of the constant.
-        stiffness: dC, (3, 3) or (6, 6).
+        stiffness: dC, (3, 3) or (6, 6); in conduction dk, (3, 3).
         expansion: (6,) d alpha.
     """
 
@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield derivatives by each given constant; by expansions only in space, and last.  Raises as `stiffness_of`."""
+    """Yield a `LawChange` for each constant and, in space, expansion.  Raises as `stiffness_of` and `expansion`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -89,7 +89,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC for each entry of a given stiffness.  Entries ij and ji change together."""
+    """Yield name, value and dC for entries of a given stiffness except COUPLINGS; entries ij and ji change together."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:
@@ -129,10 +129,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate `constants` along the changes dC and dthermal.
-
-    The result has thermal constants only if `thermal` and `dthermal` are given.
-    """
+    """Differentiate `constants` of C and heat `thermal` along dC, dthermal; without thermal arguments, only of C."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

@@ -89,7 +89,8 @@ class Isotropic:
 class Orthotropic:
     """Engineering constants along the material axes 1, 2 and 3 = x3; nu_ij = -eps_j/eps_i under stress along i.
 
-    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12, plane strain also E3, nu13, nu23, generalized all.
+    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12, G12; plane strain also E3, nu13, nu23; generalized plane
+    strain all constants.
     """
 
     E1: float = stress("Young's modulus along axis 1.")
@@ -114,7 +115,7 @@ class TransverselyIsotropic:
     """Engineering constants of a phase that is isotropic in the plane, such as most fibres.
 
     Plane stress needs E_transverse and either nu_transverse or G_transverse, plane strain also E_axial and nu_axial,
-    generalized plane strain G_axial, too.
+    generalized plane strain also G_axial.
     """
 
     E_axial: float | None = stress("Young's modulus along x3; plane strain needs it.", default=None)
@@ -224,7 +225,7 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
 
 
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
-    """Compute the utilisations (n,) of the four `MODES`; at most 0 where the stress has not the sign of the mode.
+    """Compute utilisations (n,) of the `MODES` from strengths `limits`; at most 0 for stresses of the opposite sign.
 
     A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """

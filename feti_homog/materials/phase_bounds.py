@@ -185,8 +185,8 @@ def aligned_cylinders(
         l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
         b* = (k* + m0) B,  B = sum c b/x,  g* = sum c (g - l b/x) + l* B,
 
-    because s + m0 theta is equal in all cylinders (Hill 1964, Hashin 1965, Walpole 1969; b, g likewise).  Expansions
-    are None unless all phases have both.
+    because s + m0 theta is equal in all cylinders, also under a change of temperature (Hill 1964, Hashin 1965, Walpole
+    1969).  Expansions are None unless all phases have both.
     """
     c, (k0, m0, p0) = np.asarray(fractions, dtype=float), surroundings
     k, nu, E, m, p = np.array(

@@ -108,7 +108,7 @@ def strain_rotation(angle: float) -> Float:
 
 
 def is_positive_definite(matrix: Float) -> bool:
-    """Return whether a symmetric matrix, its positive diagonal scaled to 1, has only eigenvalues above 1e-12."""
+    """Return whether a symmetric matrix, scaled to a diagonal of 1, has only eigenvalues above 1e-12."""
     diagonal = np.diag(matrix)
     if diagonal.min() <= 0.0:
         return False

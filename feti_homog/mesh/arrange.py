@@ -47,7 +47,7 @@ def random_arrangement(
     Fibre radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, scaled to the phase fractions; voids have one
     radius. Gaps between discs, with coatings and images, are at least `min_gap` mean fibre diameters. A descent from
     random centres x_i reduces the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 to zero; R_i includes the
-    coating and half the gap. After `max_steps` (default: `random_fibres.MAX_STEPS`), it restarts, in up to
+    coating and half the gap. After `max_steps` (default: `random_fibres.MAX_STEPS`), the descent restarts, in up to
     `max_attempts` attempts (default: 10 for few discs, 3 for many). Finally, `clear_shift` moves the arrangement.
 
     Raises:

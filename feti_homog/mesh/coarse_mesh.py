@@ -60,7 +60,7 @@ class CoarseMesh:
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: largest move of a node in a user's mesh to make opposite sides match.
         origin: lower left corner of the cell in the coordinates of the user.
-        remarks: lines on differences from a fibre table, or on unused curves and nearly round polygons of a mesh file.
+        remarks: lines on fibre tables and fractions in images, on unused curves and nearly round polygons of a file.
         boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only periodic nodes have images.
         centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then
             the coatings in the same order.
@@ -141,7 +141,8 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
     """Flip the chords of triangles (m, 3) with two edges on one circle; return all triangles.
 
     Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
-    by the other diagonal of the two triangles at the chord. Chords between phases, or of one triangle, stay.
+    by the other diagonal of both triangles at the chord. Chords between phases or of one triangle stay. `nodes` is the
+    node count.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -164,7 +165,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find the triangles (b,) with two edges on one circle, and the corner (b,) between them, among `nodes` nodes."""
+    """Find triangles (b,) with two edges on one circle, and the corner (b,) between both; `nodes` is the node count."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

@@ -60,7 +60,7 @@ def fibre_circles(torus: Torus) -> Float:
     """Return centre and radius (constituents, 3) of each fibre's outer circle, in any periodic image.
 
     Fibres that are not round have the radius NaN, and the centre in `CoarseMesh.centres` or else the area centroid. The
-    centre is NaN for the matrix, and for fibres without a listed centre that wind around the torus.
+    centroid is NaN for fibres that wind around the torus. The matrix has NaN for both.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
@@ -101,9 +101,9 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find the fibres (k,) within the largest of the concentric ellipses that bound them.
+    """Find the fibres (k,) with boundaries on concentric ellipses.
 
-    Also returns a plane edge (k,) on the largest ellipse of each fibre, and the mask (k,) of round fibres.
+    A fibre lies inside the largest ellipse. Also returns a plane edge (k,) on it, and the mask (k,) of round fibres.
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
@@ -128,7 +128,8 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """Return the numbers (constituents,) of fibres and coatings, and the mask (constituents,) of fibres.
 
-    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of its fibres, or counts as a fibre.
+    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of its fibres; without fibres, it counts
+    as a fibre.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]

@@ -29,12 +29,12 @@ class Torus:
     Attributes:
         mesh: the plane mesh of m triangles or pixels, or some tiles of a larger mesh.
         node_class: (n,) class of each plane node.
-        edges: (e, 2) plane edges in ascending order of nodes, from the lexicographically lower to the upper end.
+        edges: (e, 2) plane edges, sorted by node numbers; each runs from the lexicographically lower to the upper end.
         triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3); (m, 4) for pixels.
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) mask of edges at voids: one triangle in the whole cell, not on sides without images.
+        at_void: (torus edges,) mask of edges at voids: one triangle in the whole cell, not on a side without images.
         is_whole: whether no triangle in the cell is missing.
     """
 
@@ -74,7 +74,7 @@ class Torus:
 
     @property
     def triangle_torus_edges(self) -> Int:
-        """The torus edge (m, 3) from vertex k to vertex k + 1 (mod 3)."""
+        """The torus edge (m, 3) from vertex k to vertex k + 1 (mod 3); (m, 4) for pixels."""
         return self.torus_edge[self.triangle_edges]
 
     @cached_property
@@ -92,7 +92,7 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the ends (k, 2) of torus edges in the mask `chosen`, on cell sides at the left or lower copy."""
+        """Return the ends (k, 2) of torus edges in the mask `chosen`.  On cell sides, the left or lower copy counts."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 
@@ -250,7 +250,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Return the distinct `numbers` (k,), ascending and less than `size`, and the index of every entry."""
+    """Return the distinct `numbers` (k,), ascending, and the index of every entry.  All numbers are below `size`."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))

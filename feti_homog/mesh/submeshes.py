@@ -285,6 +285,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Concatenate the index arrays `name`, each shifted by the number of `of` entries in earlier parts."""
+    """Concatenate the index arrays `name`, each shifted by the total length of the arrays `of` in earlier parts."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

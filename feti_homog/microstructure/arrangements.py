@@ -214,7 +214,7 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return coordinates (k, 2, 2) of tangents to k outlines, normal to the axes: by axis, low and high."""
+    """Return the coordinates (k, 2, 2) of tangents normal to each axis, low then high, of k outlines and rings."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 
@@ -223,10 +223,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     """Find all pairs i <= j of centres and images closer than `reach`.
 
     A centre and its image form a pair i = j, which occurs from both ends; other pairs of images occur once.  Returns
-    i (k,), j (k,), and the vectors (k, 2) from i to the image of j.
-
-    Raises:
-        MeshError: there are more pairs than MOST_PAIRS, by an estimate.
+    i (k,), j (k,), and the vectors (k, 2) from i to the image of j.  Raises MeshError beyond about MOST_PAIRS pairs.
     """
     inside = centres % size
     images = inside + STEPS[:, None] * size

@@ -55,7 +55,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
 
-        For a window the value is unbiased: these discs outside and other discs inside have equal areas on average.
+        For a window the value is unbiased: on average, these discs cover as much outside as other discs cover inside.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 

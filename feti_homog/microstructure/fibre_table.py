@@ -106,9 +106,9 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Read a fibre table from a text file.  Fibres may overlap.
 
     The first line, or `columns`, lists the names: x, y, radius (or a, b), phase, coating, angle and other names that
-    `understood` accepts. A line per fibre follows. Commas, semicolons, tabs or else spaces separate columns; commas may
-    be decimal marks if other characters separate columns. "#" begins a comment; "# width = 120, height = 80" gives the
-    cell size, and "left" and "bottom" give the lower left corner.
+    `understood` accepts. A line of units may follow, then a line per fibre. Commas, semicolons, tabs or else spaces
+    separate columns; commas may be decimal marks if other characters separate columns. "#" begins a comment;
+    "# width = 120, height = 80" gives the cell size, and "left" and "bottom" give the lower left corner.
 
     Raises:
         CaseError: the table is faulty; one line per fault, with the line number in the file.
@@ -151,11 +151,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """Build a table from a list of fibres {column: value}; messages number the rows from 1.
-
-    Raises:
-        CaseError: the list is faulty; one line per fault.
-    """
+    """Build a table from fibres {column: value}; rows are numbered from 1.  Raises CaseError, one line per fault."""
     faults = _Faults(name)
     for number, entry in enumerate(entries, 1):
         for key in entry.keys() - set(COLUMNS):
@@ -183,7 +179,7 @@ class _Faults:
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add repeated, misspelt and missing column names to the faults; CaseError without any known name."""
+    """Add repeated, misspelt and missing column names and mixed units to the faults; CaseError without known names."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -209,7 +205,7 @@ def _check_names(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Check the cells of all rows, and build the table.  Raises CaseError with earlier and further faults."""
+    """Check all `rows`, and build the table with size and corner from `sizes`.  Raises CaseError with all `faults`."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
         for key in ("x", "y", *([] if has_size else ["radius"])):

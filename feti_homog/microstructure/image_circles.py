@@ -35,7 +35,7 @@ def round_fibres(image: Float) -> Float:
 
 
 def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, Float]:
-    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` pixels.
+    """Fit circles to edges (n, 2) with unit normals `inward` (n, 2) in an image of `size` (columns, rows).
 
     Returns the fraction of the edges that lie on circles, and the circles (k, 3).
     """
@@ -81,7 +81,7 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return (f - `by_chance`) sqrt(L) (k,), for f <= 1 edges per pixel on L visible rim pixels; 0 for hidden rims."""
+    """Return (f - `by_chance`) sqrt(L) (k,): f <= 1 edges per pixel on L visible rim pixels; 0 if 80 % are hidden."""
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)
@@ -89,7 +89,7 @@ def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chanc
 
 
 def _apart(circles: Float, excess: Float) -> Bool:
-    """Mark circles (k,) by falling `excess` (k,), unless they overlap marked circles by 0.4 of the smaller radius."""
+    """Mark circles (k,), highest `excess` first, but none that overlaps a marked one by 0.4 of the smaller radius."""
     tree, is_apart = cKDTree(circles[:, :2]), np.zeros(len(circles), bool)
     is_covered = np.zeros(len(circles), bool)
     for k in np.argsort(-excess, kind="stable"):

@@ -26,7 +26,8 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is no image of whole numbers, or its numbers differ from `labels`, one per line.
+        CaseError: the file is too large or no image of whole numbers, or its numbers differ from `labels`, one per
+            line.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)

@@ -28,9 +28,9 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     border are moved apart. With `repairs`, fibres that overlap slightly shrink first.
 
     The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
-    so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`), and
-    coordinates are rounded and sorted: tables that differ by a shift, the row order or units have the same mesh.
-    Coordinates of fibres that are not discs are always rounded.
+    so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`),
+    coordinates are rounded, and `mesh_order` sorts the fibres: tables that differ by a shift, the row order or units
+    have the same mesh. Coordinates of fibres that are not discs are always rounded.
 
     Raises:
         MeshError: rows lie outside, have wrong sizes, occur twice, overlap or touch, one line per fault; or a cut
@@ -74,8 +74,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
     """Shrink the fibres of a table that overlap slightly.
 
-    Fibres that touch, or overlap by up to SAME_FIBRE times the smaller radius, shrink until they separate. Returns the
-    table, and a remark with the rows of the shrunk fibres.
+    Fibres that touch, or overlap by up to SAME_FIBRE times the smaller radius, shrink until they separate, but not
+    across the border of a cut window. Returns the table, and a remark with the rows of the shrunk fibres.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
@@ -115,8 +115,8 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """Check the fibres of a table and place them on the torus.
 
-    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Raises MeshError as
-    `table_arrangement` does.
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Only cut windows have
+    moves. Raises MeshError as `table_arrangement` does.
     """
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])
@@ -221,7 +221,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Find the pairs of near fibres among the rows `kept` (k,).
+    """Find the pairs of near fibres among the rows `kept` (k,), with the outlines `outer`.
 
     Returns, all (p,): indices into `kept` of both fibres, gaps, radius sums, and the mask of pairs across the border.
     """

@@ -37,7 +37,7 @@ class NearestNeighbours:
         weights: (N, k), weights of the distances in their distribution; each column sums to 1.  In a periodic cell
             weights are 1/N.  In a window a distance d counts if the circle of radius d around the fibre lies inside, so
             that no fibre outside can be closer.  The weight 1 / ((width - 2 d) (height - 2 d)) [Hanisch 1984]
-            compensates that fewer long distances count.  A column is zero if none of its distances counts.
+            compensates for the loss of long distances.  A column is zero if none of its distances counts.
     """
 
     distances: Float
@@ -98,7 +98,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
-    """Return the quantiles (count, SHELLS) of the neighbour distances in a pattern.
+    """Return the quantiles (count, SHELLS) of the neighbour distances in the pattern `measured`.
 
     The levels are (i + 1/2) / count; the unit is the mean diameter. Raises ValueError if a window is too small.
     """
@@ -120,8 +120,9 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
     """Move the fibres of a periodic pattern to reduce `match_distance` to the target `wanted`.
 
     A trial move takes a random fibre to a random position around its centre, near or far. The move is accepted if the
-    fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. Sums have a
-    fixed order of terms, so that every machine takes the same moves. Returns the centres (N, 2), N at least 3.
+    fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. The search ends
+    when this distance is below CLOSE, or after MOVES_OF_A_FIBRE moves per fibre, at most MOST_MOVES. Sums have a fixed
+    order of terms, so that every machine takes the same moves. Returns the centres (N, 2), N at least 3.
     """
     count, size = pattern.count, pattern.size
     centres, target = pattern.wrapped.copy(), wanted * (2 * pattern.mean_radius)
@@ -179,9 +180,10 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2; success is at least
-    1. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no
-    reductions over the discs, so that every machine gets the same numbers.
+    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2. Without success in
+    `max_steps` steps, the clearance is below 1 and belongs to the centres before the last step. The heavy-ball descent
+    x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no reductions over the discs, so
+    that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -222,6 +224,9 @@ def placed(
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, of N discs in a periodic cell from a measured window."""
+    """Return the `match_distance`, in mean diameters, between a measured window and N discs in a periodic cell.
+
+    Raises ValueError if the window is too small.
+    """
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

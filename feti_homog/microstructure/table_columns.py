@@ -43,7 +43,8 @@ UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     """Yield number, content and comment of each line in a text file.
 
-    Numbers begin at 1; the content is "" for lines without cells, and "sep=;"; the comment is the text behind "#".
+    Numbers begin at 1; the content is "" for lines without cells, and for a first line such as "sep=;"; the comment is
+    the text behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is not text.
@@ -133,7 +134,7 @@ def _bare(word: str) -> str:
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Recognize `known` columns in a line of names, in upper or lower case; also return the other names."""
+    """Recognize `known` columns, also by names in OTHERS, regardless of case.  Returns columns and unread names."""
     bare = list(map(_bare, words))
     if MATLABS_AXIS in bare:
         # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.
@@ -161,7 +162,7 @@ def misspelt(word: str, missing: Sequence[str]) -> str:
 
 
 def number_of(word: str, delimiter: str | None) -> float | None:
-    """Convert a word to a number, with a decimal point, or comma unless it is the delimiter; None if not finite."""
+    """Convert a word to a finite number, or return None.  Commas are decimal marks unless they are the delimiter."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:

@@ -16,7 +16,7 @@ from feti_homog.report.text.summary import REMARKS, answers, checks, summary, ti
 from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Document
 
-NAME, SWEEP = "report.html", "sweep.json"
+NAME = "report.html"
 UNIT_LOADS = dict.fromkeys((*voigt.STRAINS, *voigt.SPATIAL_STRAINS, "temperature"))
 PICTURES = {
     "cell": "The cell: phases and numbers of the fibres",
@@ -46,13 +46,9 @@ def write(directory: Path) -> Path:
     Call on one rank.
 
     Raises:
-        CaseError: the folder has no result, is the folder of a sweep, or has a missing or damaged file.
+        CaseError: the folder has no result, or has a missing or damaged file.
         FetiHomogError: result.json cannot be read, or the report cannot be written.
     """
-    if not directory.is_dir():
-        raise CaseError(f"cannot report {directory}: there is no such folder")
-    if (directory / SWEEP).exists():
-        raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name the folder of one of its cases")
     document = output_folder.latest(directory)
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     try:

@@ -1,4 +1,4 @@
-"""Write files that appear complete or not at all, even if the writer is killed; `append` alone extends a file in place.
+"""Write files that appear complete or not at all, even if the writer is killed; only `append` extends a file in place.
 
 The writer waits until both the content and the name of a file are on the disk.
 """
@@ -55,8 +55,8 @@ def commit(part: Path, path: Path) -> None:
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
     """Write `content` at position `start` of a file; drop all former bytes from there on.
 
-    At position 0 the function creates the file and its folder.  If the content `lasts`, it waits until the bytes are on
-    the disk.  A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises
+    At position 0 the function creates the file and its folder.  With `lasts`, it waits until the bytes are on the
+    disk.  A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises
     FetiHomogError if the file cannot be written.
     """
     with file_errors("write", path):
@@ -78,7 +78,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove the unfinished files of `names` in a folder, as far as possible.
+    """Remove unfinished files with names that match `names` in a folder, as far as possible.
 
     Unless this process writes there `alone`, files of running writers stay.
     """

@@ -55,6 +55,7 @@ class EventsInMemory:
     """A store of distributed events in memory, for runs without files.  Every method is collective.
 
     Attributes:
+        comm: communicator of the run.
         room: total size in bytes, beyond which further events have no multipliers; None without a limit.
     """
 
@@ -66,17 +67,11 @@ class EventsInMemory:
         self._events, self._bytes = [], 0
 
     def count(self) -> int:
-        """Return the number of events; `Checkpoint` checks its file before.
-
-        Raises CaseError if the file is damaged, or of another run.
-        """
+        """Return the number of events.  `Checkpoint` raises CaseError if its file is damaged, or of another run."""
         return len(self._events)
 
     def read(self, number: int) -> Arrays:
-        """Return event `number`, with this rank's part of each distributed array.
-
-        Raises CaseError if the event is unreadable.
-        """
+        """Return event `number`, with this rank's parts of distributed arrays.  Raises CaseError if it is damaged."""
         return unpacked(self._events[number])
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays) -> None:
@@ -86,8 +81,7 @@ class EventsInMemory:
             shared: values, equal on all ranks.
             distributed: this rank's parts of distributed arrays.
 
-        Raises:
-            FetiHomogError: the file cannot be written.
+        Raises FetiHomogError if a `Checkpoint` cannot write its file.
         """
         event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
         self._bytes -= sum(map(len, self._events[number:]))
@@ -95,7 +89,7 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return an event to store.  It has no multipliers and jumps if `size` bytes of events fill the room."""
+        """Return an event to store, without multipliers and jumps if `size` bytes of stored events fill the room."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
@@ -104,6 +98,7 @@ class Checkpoint(EventsInMemory):
     """A store of events in the file `directory`/checkpoint/events, which rank 0 writes.
 
     Attributes:
+        path: path of the file.
         signature: a line with case, subdomains and ranks, which must agree to resume; then entries of result.json.
     """
 
@@ -254,8 +249,7 @@ def refuse_others(directory: Path) -> None:
 def remove(directory: Path) -> None:
     """Rename the checkpoint folder, then remove it, so that no run finds a part of it.  Call on one rank.
 
-    Raises:
-        FetiHomogError: the folder cannot be renamed.
+    Raises FetiHomogError if the folder cannot be renamed.
     """
     folder, dropped = directory / FOLDER, directory / DROPPED
     _remove_events(dropped)

@@ -30,7 +30,7 @@ RESERVE = 1 << 17  # bytes of disk space for the headers that HDF5 adds
 
 @dataclass(frozen=True)
 class _Rows:
-    """The range of this rank's rows in a shared table, ordered by rank."""
+    """The range of this rank's rows in a shared table; the table has all ranks' rows in rank order."""
 
     start: int
     count: int
@@ -47,11 +47,12 @@ class FieldFile:
 
     `field_layout` lists tables, attributes and views of tables.  An array without rows has shape (0, ...).
 
-    Until `close` the file has the name `part`. A `with` block closes the file at its end. An error that all ranks raise
-    removes the file; any other exception leaves the file unfinished.
+    Until `close` the file has the name `part`. A `with` block closes the file at its end. A FetiHomogError on all ranks
+    removes the file; any other exception in the block leaves the file unfinished.
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
+        ValueError: tables of one kind have different numbers of rows.
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class FieldFile:
         """Complete the file, give it its final name, and return its path."""
 
         def complete() -> None:
-            """Add views and rename the file.  On one rank: on all ranks, views would cost as much as tables."""
+            """Add views and rename the file.  Call on one rank: on all ranks, views would cost as much as tables."""
             # No lock: only this process has the file open, and some file systems have no locks.
             with h5py.File(self.part, "r", locking=False) as file:
                 size = (1 << 12) * (1 + len(field_layout.views_of(file)))  # measured: 0.9 KB for each view on average
@@ -138,7 +139,7 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Write the tables of a group; each rank writes its own rows."""
+        """Write the tables of a group; each rank writes its own rows.  Raises ValueError for a wrong number of rows."""
         size = self._bytes(part)
         self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size

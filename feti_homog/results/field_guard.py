@@ -29,8 +29,8 @@ def require_own(path: Path, state: int | None = None) -> None:
     """Check result.h5 in a child process, because HDF5 may crash on damaged files.
 
     The check refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than
-    the file or outside it; other layouts; numbers outside RANGES, in all states or in one `state`.  Raises CaseError
-    for these faults and a missing file, FetiHomogError for missing permissions.
+    the file or outside it; other layouts; a damaged mesh or case; numbers outside RANGES, in all states or in one
+    `state`.  Raises CaseError for these faults and a missing file, FetiHomogError for missing permissions.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
@@ -71,7 +71,7 @@ def require_tables(path: Path, state: int | None) -> None:
 
 
 def _require_layout(path: Path, file: Any, state: int | None) -> None:
-    """Compare shapes, types and ranges of all tables and attributes with `field_layout`.  Raises CaseError."""
+    """Compare tables and attributes with `field_layout`, and numbers with RANGES as in `require_own`; CaseError."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
     counts = {symbol: (*(entry.shape or ()), 0)[0] for symbol, entry in entries.items()}

@@ -149,12 +149,12 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return descriptions, by name, of the fields that become datasets.  These have rows."""
+    """Return descriptions of the fields with rows, which become datasets, by name."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return values, by name, of the fields that become attributes.  These have no rows."""
+    """Return values of the fields without rows, which become attributes, by name."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 

@@ -34,7 +34,7 @@ def header(cell: unit_cell.TornCell) -> Header:
 
 
 def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
-    """Concatenate the refined meshes of this rank's subdomains."""
+    """Concatenate the refined meshes of this rank's subdomains; nodes are numbered from 0 on each rank."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -93,11 +93,9 @@ def state_parts(
 ) -> Iterator[StatePart]:
     """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
 
-    A state has a response in the plane problem and, if there is one, in the axial problem; conduction takes the place
-    of the axial problem.  A problem without a response (None) has zero fields.
-
-    Raises:
-        ValueError: a state has no response.
+    `states` maps labels to responses: in the plane problem and, if there is one, in the axial problem; conduction takes
+    the place of the axial problem.  A problem without a response (None) has zero fields.  `load_factor` and `point` are
+    as in `StatePart`.  Raises ValueError if a state has no response.
     """
     axial_cell = cell.axial or cell
     for number, (label, responses) in enumerate(states.items()):
@@ -105,15 +103,14 @@ def state_parts(
         response, stress = plane or axial, fields.stress[number]
         if response is None:
             raise ValueError("expected a response")
-        shares = [
-            recovered_fields.error_shares(torn, r) for torn, r in ((cell, plane), (axial_cell, axial)) if r is not None
-        ]
+        shares = [part.shares for part in (plane, axial) if part is not None and part.shares is not None]
+        errors = np.sum(shares or [np.full(stress.shape[1], np.nan)], axis=0)
         u = [x[:, number] for x in fields.displacement]
         problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
         in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
         common: dict[str, Any] = {"load_factor": load_factor, "point": point, "label": label}
         energy = sum(2 * part.stored for part in responses if part is not None)  # E . Sigma
-        common["mesh_error"] = (np.sum(shares, axis=0) / (energy if energy > 0 else 1.0)).astype(np.float32)
+        common["mesh_error"] = (errors / (energy if energy > 0 else 1.0)).astype(np.float32)
         common["stress_33"] = stress[2]
         common["stress"] = stress[voigt.IN_PLANE].T
         if plane is not None and cell.axial is None:

@@ -50,7 +50,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     than `LEAST_FALL`, and all falls of an unfinished path, count only after the largest stress.  The entry `so_far`
     marks a path that is unfinished, or stopped early without a fall.
 
-    On a path with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
+    On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
     points, component = path_curves.leading_points(document), path_curves.leading_component(document)
     before = len(path_curves.leading_points(document, ("broke", "softened")))
@@ -111,14 +111,14 @@ def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float
 
 
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Name the largest stress: PEAK before a fall, SO_FAR on an unfinished path, else LARGEST."""
+    """Name the largest stress: SO_FAR if `peak` has an entry `so_far`, PEAK before a fall, else LARGEST."""
     if "so_far" in peak:
         return SO_FAR
     return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
 
 
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
-    """Return a line for each phase that passes its strength before the peak.
+    """Return a line for each phase that passes its strength up to the peak.
 
     The lines give stress and strain.  Utilisations at the kept points `numbers` are interpolated linearly, from 0 on.
     """
@@ -157,7 +157,7 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
-            marked points if they all fit, points around the deepest drops for half the rest, and evenly spaced points.
+            marked points if they all fit, points around the deepest drops (up to half the rest), evenly spaced points.
         legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
     """
     if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
@@ -180,10 +180,11 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
 
 def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
-    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress.
+    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress or strain.
 
     A drop leads from a peak to the next valley.  On the first of `legs` legs (see `kept`), a drop also leads from each
-    load at which bonds break to the next point that a rising load reaches.  A jump leads across all points at one load.
+    load at which bonds break to the next point that a rising load reaches.  Elsewhere, a jump leads across all points
+    at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)

@@ -40,7 +40,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that a run can use the folder `directory`, and create nothing.
+    """Check that a run can use the folder `directory`; nothing is created.
 
     The folder, or the folder in which it will lie, must be writable, and no other run may use it.  Raises CaseError.
     """
@@ -66,7 +66,7 @@ def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
     Raises:
-        CaseError: a folder or a broken link has the name of a result file, or a foreign file has such a name.
+        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder is unreadable.
     """
     if not directory.is_dir():
         return
@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def replaced(directory: Path, case: Case) -> str:
-    """Return a line about an unreadable or another case's result that a run replaces, or "".  Call on one rank.
+    """Return a warning if a run replaces an unreadable result, or one of another case; else "".  Call on one rank.
 
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
@@ -124,7 +124,7 @@ def foreign(directory: Path, name: str, kind: str) -> CaseError:
 
 
 def _is_own(path: Path) -> bool:
-    """Return whether any version of the program wrote this result.json, result.h5, result.lock or events.log."""
+    """Return whether any version of the program wrote result.json, result.h5 or events.log; True for other files."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))
@@ -142,8 +142,8 @@ def latest(directory: Path) -> dict[str, Any]:
     """Return the document of result.json or of the checkpoint.  Call on one rank.
 
     The checkpoint counts if it has more points, or result.json is missing or of another case; then `unfinished` and
-    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, FetiHomogError for
-    missing permissions.
+    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, or unreadable
+    events, FetiHomogError for an unreadable result.json.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -228,7 +228,10 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank."""
+    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank.
+
+    Raises FetiHomogError if the checkpoint folder cannot be removed.
+    """
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -242,7 +245,7 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 def write_product(path: Path, text: str) -> Path:
     """Write the output of a command (a card or a fibre table) to a file; return its path.
 
-    If `path` is a link, the function replaces the file at its target.
+    If `path` is a link, the function replaces the file at its target. Unfinished files of ended commands are removed.
 
     Raises:
         CaseError: `path` is a folder, a device or a pipe, lies in no folder, or has the name of a result file.

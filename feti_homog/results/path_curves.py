@@ -65,7 +65,10 @@ def leading_component(document: Document) -> int:
 
 
 def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg with a positive count in `counts`; else all points."""
+    """Return the points up to the end of the first leg with damage; without damage, all points.
+
+    A point has damage if one of the entries `counts`, such as `broke`, is positive.
+    """
     leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
 
@@ -152,9 +155,9 @@ def scales_with_toughness(document: Document) -> bool:
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return the corners (v, 2 c) of a proportional path under a rising load, stresses first.
 
-    Where bonds break at a load t, all bonds that cannot carry t without them also break.  The cell then follows the
-    next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t', and
-    the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
+    Where bonds break at a load t, all bonds that cannot carry t without these bonds also break.  The cell then follows
+    the next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
+    and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])

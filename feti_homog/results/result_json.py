@@ -1,7 +1,7 @@
 """Read and write result.json, write points as CSV tables and event logs, and seal files by checksums.
 
-Each file is written completely or not at all.  A checksum in a JSON document, or beside a large file, reveals damage
-and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
+Each file but the event log is written completely or not at all.  A checksum in a JSON document, or beside a large file,
+reveals damage and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
 """
 
 import contextlib
@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with arrays, as `loads` parses it.  Raises like `write` for values."""
+    """Write a document with its checksum as text for `loads`.  Values and their errors are as in `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -120,8 +120,8 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
     """Write a CSV table with a row for each record, and return the path.  Call on one rank.
 
-    The records have one class.  Columns are numbers, strings and array components, without empty columns, other arrays
-    and nested records.  Raises FetiHomogError if the table cannot be written.
+    The records have one class.  Columns are numbers, strings and array components; empty columns, other arrays and
+    nested records are left out.  Raises FetiHomogError if the table cannot be written.
     """
     fields = _in_columns(type(points[0])) if points else {}
     rows = []
@@ -146,7 +146,7 @@ def _in_columns(kind: type) -> dict[str, records.Description]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
-    """Return rows as CSV.  An apostrophe precedes strings that a spreadsheet would evaluate."""
+    """Return rows as CSV with line ends `end`.  An apostrophe precedes strings that a spreadsheet would evaluate."""
     stream, formula = io.StringIO(newline=""), re.compile(r"[=@]|[+-](?![0-9.]+([eE][+-][0-9]+)?$)")
     texts = ([f"'{cell}" if isinstance(cell, str) and formula.match(cell) else cell for cell in row] for row in rows)
     csv.writer(stream, lineterminator=end).writerows(texts)
@@ -228,7 +228,7 @@ class FileSeal:
 
 
 def seal(path: Path, block: int = BLOCK) -> FileSeal:
-    """Return the size and checksum of a file.
+    """Return the size and checksum of a file, read in blocks of `block` bytes.
 
     Call on the rank that completed the file: other ranks may still see an earlier file of that name.  Raises
     FetiHomogError if the file cannot be read.
@@ -240,7 +240,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Check a file against its seal.  Call on one rank.
+    """Check a file against its seal; `block` is as in `seal`.  Call on one rank.
 
     Raises:
         CaseError: size or checksum differ.
@@ -265,7 +265,7 @@ def _sealed(text: str, checksum: Any) -> str:
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize a value with indents.  An array of numbers, or a row of a matrix, takes one line."""
+    """Serialize a value with line breaks and indents `begin`.  An array of numbers, or a matrix row, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

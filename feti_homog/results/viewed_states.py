@@ -32,7 +32,7 @@ class ViewedState:
         points: (n, 3) node positions; nodes are torn between subdomains.
         cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
-        means: load_factor, temperature, mean_strain and mean_stress, each a row (1, c), from `xdmf.cell_means`.
+        means: rows (1, c) from `xdmf.cell_means`: load_factor, mean_strain, mean_stress and, in space, temperature.
         label: state label.
     """
 
@@ -51,9 +51,9 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
     """Read a cell state from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length).  `elements` has element
-    means: the tensors stress and strain; S11, S22, S12, S33, von_mises, and principal_1 to principal_3, largest first
-    (stress); body, fibre_number, phase and subdomain.  Strains include thermal strains.  A value is NaN if the material
-    constants do not determine it.
+    means: the tensors stress and strain; S11, S22, S12, S33, in space S23 and S13, von_mises, and principal_1 to
+    principal_3, largest first (stress); body, fibre_number, phase, subdomain and mesh_error.  Strains include thermal
+    strains.  A value is NaN if the material constants do not determine it; mesh_error is NaN without an estimate.
 
     Raises:
         CaseError: result.h5 is missing or damaged, or has no such state.
@@ -98,7 +98,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Read a state at the interface nodes, with displacements of both faces, tractions, jumps, status and geometry."""
+    """Read a state at the interface nodes: displacements of both faces, tractions, jumps, bond states, geometry."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)

@@ -1,8 +1,8 @@
 """Write result.xdmf and interface.xdmf, which let ParaView read result.h5.
 
 The files use only features that all XDMF readers of ParaView and VTK support: whole datasets, points with a
-connectivity, tensors with nine components, one collection per file.  Readers load no strings, so a state label is
-the name of a block, which two readers show, and an array of bytes, with the same length in all states.
+connectivity, tensors with nine components, one temporal collection per file.  Readers load no strings, so a state label
+is the name of a block, which two readers show, and an array of bytes, with the same length in all states.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets, by field name, of state fields with one of the `shapes`.  LISTED datasets are left out."""
+    """Return the datasets of state fields with one of the `shapes`, by field name, without LISTED datasets."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 

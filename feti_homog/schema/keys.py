@@ -41,7 +41,7 @@ class Condition:
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition in a message about `section`: key = A or B, or [other] key = A or B."""
+        """Write the condition in a message about `section`: key = A or B, with [other] before a key from elsewhere."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
@@ -136,7 +136,7 @@ class TableReader:
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
         """Convert a table to an instance of `table_class`; return None if the table is faulty.
 
-        Every fault, also in a nested table, adds a line to `faults`; `prefix` precedes the key name in this line.
+        Every fault, also in a nested table, adds a line to `faults`, which names `section`, `prefix` and key.
         """
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")

@@ -57,7 +57,7 @@ class ValueType:
 
 
 def hint(value: Any) -> str:
-    """Return a hint on a number beyond the magnitude limits or a table of scatter, also in a list; else empty."""
+    """Return a hint on a wrong magnitude or a table of scatter, also in a list; empty for other values."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(hint, value)), "")
     if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):

@@ -66,7 +66,7 @@ def dotted_key(path: Iterable[str]) -> str:
 
 
 def suggestion(name: str, known: Collection[str], owners: Mapping[str, str]) -> str:
-    """Return a hint for an unknown name: a synonym, a reason for its absence, its section, or valid names.
+    """Return a hint for an unknown name: a synonym, a reason for its absence, its section, the closest or all names.
 
     `known` are the valid names, and `owners` maps every key of the file to its sections, in words.
     """
@@ -83,6 +83,6 @@ def suggestion(name: str, known: Collection[str], owners: Mapping[str, str]) -> 
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with the fewest digits, `digits` or more, that do not make it exceed `value`."""
+    """Write a limit with the fewest digits, at least `digits`, that keep it at or below `value`; else all digits."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

@@ -77,9 +77,10 @@ class SweepIndex:
 
 
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
-    """Refuse a folder with another study, or with foreign files of a study's names.  On one rank.
+    """Refuse a folder that holds another study, or foreign files.  On one rank.
 
-    Raises CaseError for such a document, file or subfolder that is not empty, OSError if the folder cannot be read.
+    Raises CaseError for a study's document, and for a non-empty file or subfolder with a name in `entries`; OSError if
+    the folder cannot be read.  `kind` names the new study in the message.
     """
     for path in sorted(directory.iterdir()):
         if path.name in DOCUMENTS:
@@ -92,8 +93,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 def document_lock(directory: Path) -> Iterator[None]:
     """Context manager: lock the document of a study during a block.  On one rank.
 
-    A file system without locks has no lock.  Raises CaseError if another process holds the lock for
-    INDEX_LOCK_TIMEOUT_S.
+    Does nothing on a file system without locks.  Raises CaseError if a process holds the lock for INDEX_LOCK_TIMEOUT_S.
     """
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:
@@ -112,7 +112,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the sweep folder, or extend its case list.  On one rank.
 
     Raises:
-        CaseError: the folder cannot be made, or holds another sweep, or foreign files under the file names of a sweep.
+        CaseError: the folder cannot be made, has another sweep or foreign files, or its list is unreadable or locked.
         FetiHomogError: the folder cannot be written.
     """
     try:
@@ -182,7 +182,7 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case.  Without a result, it is RUNNING while a process holds its lock.  On one rank."""
+    """Return the progress of a case: RUNNING if it has no result and a process holds its lock.  On one rank."""
     state, folder = stored_state(directory, entry), directory / entry.folder
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
@@ -227,7 +227,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a failed or damaged case to WAITING; remove error and events.  On one rank.  Raises like `set_aside`."""
+    """Reset a case to WAITING: remove error and events, set aside the result.  On one rank; raises like `set_aside`."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)

@@ -22,7 +22,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep, with the status unless `directory` is None.  On one rank."""
+    """Return a line for each case of a sweep, with status and reason unless `directory` is None.  On one rank."""
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
@@ -59,7 +59,7 @@ def run_all(
     size = group_size(comm, ranks_per_case)
     check_options(sweep)
     if sweep.cases[0].cell.has_own_mesh and "matrix" not in sweep.cases[0].materials:  # few meshes lack this phase
-        with suppress(MeshError):  # a fault of this case alone
+        with suppress(MeshError):  # a fault of this case only
             mpi_errors.on_root_only(comm, tile_tearing.begin_mesh, sweep.cases[0], partition_policy.BY_COST.tiles)
     with _sweep_lock(directory, comm, sweep, shared=False):
         group: Any = comm if size == comm.size else comm.Split(comm.rank // size)
@@ -116,7 +116,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make the sweep folder and lock it, `shared` or else alone (CaseError if held).  Collective."""
+    """Context manager: make the sweep folder and lock it, `shared` or exclusively (CaseError if held).  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -157,7 +157,7 @@ class CaseRunner:
         """Run cases until no free case remains; show the progress if `shows`.  Collective in the group.
 
         The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
-        Returns the error that stopped the group, or None.
+        Returns the error that stopped the group, or None; raises the error if other ranks of the group do not arrive.
         """
         timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
@@ -201,7 +201,7 @@ class CaseRunner:
                 try:
                     progress = standard_streams.Progress(self.comm, True, within)
                     runner.run(case, folder, progress, resume=case.section.is_followed)
-                except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case alone
+                except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case only
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
                     mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)

@@ -50,7 +50,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return printed tables of peaks or constants.  They show scatter over realisations, or values at points."""
+    """Return the lines of tables of peaks or constants: scatter over realisations, or values at points."""
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names

@@ -87,7 +87,7 @@ class ParameterEstimates:
 
     @property
     def correlation(self) -> Float:
-        """The correlation (n, n) of the estimates; NaN for undetermined unknowns."""
+        """The correlation (n, n) of the estimates; undetermined unknowns have a diagonal of NaN and zeros elsewhere."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.covariance / np.outer(self.std, self.std))
 
@@ -147,7 +147,7 @@ def estimate(
 def summarize(
     x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Gather estimates x (n,) with the values (m,) and derivatives (m, n) computed at x; the rest as in `estimate`."""
+    """Gather estimates x (n,), with values (m,) and derivatives (m, n) at x; other arguments are as in `estimate`."""
     y, std = measured
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)
@@ -159,15 +159,9 @@ def summarize(
                      singular_values=s, directions=V, evaluations=0, converged=True)  # fmt: skip
 
 
-def names_of(rows: Sequence[Sequence[int]], names: Sequence[str], teeth: int = 0) -> list[str]:
-    """Return a message for each undetermined direction, with the unknowns in its row of `rows` (indices of `names`).
-
-    `teeth` counts the teeth of a softening law, 0 for other laws.
-    """
+def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
+    """Return a message for each undetermined direction, with the unknowns in its row of `rows` (indices of `names`)."""
     reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
-    if teeth:  # only softening laws have teeth
-        reasons[True] = f"steps of a tenth of its bounds change no computed value: with {teeth} teeth the curve is a "
-        reasons[True] += "staircase; more teeth (softening_tolerance) make it smooth"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 
@@ -177,9 +171,12 @@ def _sizes(x: Float) -> Float:
 
 
 def fit_document(
-    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, teeth: int = 0
+    unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, steps: str = ""
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name.  Infinities and NaN become None.  `teeth`: see `names_of`."""
+    """Return the content of fit.json without its name.  Infinities and NaN become None.
+
+    `steps` is the key of a softening law that sets its teeth, with its value; empty without one.
+    """
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits
     if misfits and estimates.undetermined:
@@ -187,7 +184,9 @@ def fit_document(
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
         faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
-    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns], teeth)
+    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
+    cure = f"; {steps} makes the curve a staircase: more teeth (softening_tolerance) make it smooth" if steps else ""
+    faults = [f"{fault}{cure}" for fault in faults]
     faults += [
         f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
         f"width {unknown.upper - unknown.lower:.3g} of its bounds"

@@ -60,7 +60,7 @@ class Fit(Study):
         """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict the output to numbers, with derivatives unless debonded faces may touch."""
+            """Restrict output to numbers, with derivatives of conductivities, and of stiffnesses without contact."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None
@@ -111,8 +111,9 @@ class Fit(Study):
         def write(estimates: estimation.ParameterEstimates) -> dict[str, Any]:
             from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
-            teeth = next((bond.teeth for bond in self.first_cases().cases[0].interfaces if bond.teeth), 0)
-            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates, teeth)}
+            tables, keys = interface_section.interface_tables(self.document), ("teeth", "softening_tolerance")
+            steps = next((f"{key} = {table[key]:g}" for table in tables for key in keys if key in table), "")
+            document = {"name": self.name, **estimation.fit_document(self.unknowns, self.data, estimates, steps)}
             rows = [[datum[name] for name in estimation.HEAD] for datum in document["measured"]]
             atomic.replace_text(evaluator.directory / "measured.csv", result_json.csv_text([estimation.HEAD, *rows]))
             pictures.draw_fit(evaluator.directory / "fit.png", document, evaluations.answers[_rounded(estimates.x)])
@@ -169,7 +170,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start.  After a misfit or fault, search from the best of `STARTS` points.  On rank 0."""
+        """Return the estimates from the start; after a misfit or CaseError, from the best of `STARTS`.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]

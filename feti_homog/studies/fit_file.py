@@ -65,7 +65,7 @@ class FitReader:
     faults: list[str] = field(default_factory=list)
 
     def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
-        """Read the table of unknowns, and return the sound unknowns by key.  Faults go to `faults`."""
+        """Read the table of unknowns, and return the readable unknowns by key.  Faults go to `faults`."""
         if not isinstance(table, dict) or not table:
             self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}
@@ -85,7 +85,7 @@ class FitReader:
     def tests(
         self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
     ) -> tuple[list[Assignment], list[Datum]]:
-        """Read the case changes of all tests, and their sound measured values.  Faults go to `faults`."""
+        """Read the case changes of all tests, and their readable measured values.  Faults go to `faults`."""
         if (measured is None) == (tests is None):
             self.faults.append(
                 f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"
@@ -151,7 +151,7 @@ def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Read the strain and stress names and the rows of a measured curve.  Raises CaseError."""
+    """Read names and rows (strain, stress) of a measured curve.  Raises CaseError for an unreadable or faulty file."""
     lines = [(number, line) for number, line, _ in table_columns.lines_of(path) if line]
     head = lines[0][1] if lines else ""
     delimiter = table_columns.delimiter_of(head)

@@ -108,7 +108,7 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """Return the entries C11, C12, ... of a stiffness; {} for an empty one.  (3, 3) has the row names `numbers`."""
+    """Return entries C11, C12, ... by name; {} if `stiffness` is empty.  `numbers` number the rows of a 3 x 3 one."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 

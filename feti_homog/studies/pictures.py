@@ -38,7 +38,7 @@ NAMES = {
 
 
 def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw moduli over varying fibre fractions.  Returns [path of moduli.png]; [] if none vary.  On one rank."""
+    """Draw moduli over varying fibre fractions.  Returns [path of moduli.png], [] if nothing is drawn.  On one rank."""
     if not varies(table, FRACTION) or not panels_of(table):
         return []
     with mpl.rc_context(plot_helpers.STYLE):
@@ -96,7 +96,7 @@ def _limit(axes: Axes) -> None:
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
-    """Return the bounds of a result by panel.  Stiffnesses have Reuss' and Voigt's, constants tighter bounds."""
+    """Return bounds by output name: by Reuss and Voigt for C11 and C33, else by Hashin and Shtrikman, or Hill."""
     bounds = document.get("bounds") or {}
     ends, forms = [bounds[name] for name in ("reuss", "voigt") if bounds], document.get("conductivity_estimates") or {}
     pairs: dict[str, Any] = {f"C{k + 1}{k + 1}": tuple(end[k][k] for end in ends) for k in (0, 2) if ends}
@@ -147,8 +147,8 @@ def draw_fit(path: Path, document: Mapping[str, Any], results: Sequence[Document
 def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) -> Figure:
     """Draw the residuals and fit curves.
 
-    The first panel has a row for each single value, with its residual in standard deviations; the second has measured
-    points and the computed curves of the tests' `results` or, without results, the computed values at the points.
+    One panel has a row for each single value, with its residual in standard deviations; the other has measured points,
+    and computed curves from the `results` of the tests or, without a curve, the computed values at the points.
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]

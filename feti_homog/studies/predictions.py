@@ -40,7 +40,7 @@ class Datum:
 
 
 def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
-    """Yield the reasons why a case cannot compute measured values; a reason begins with `place`."""
+    """Yield the reasons why a case cannot compute measured values; `place` begins the reasons about a value."""
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":
@@ -92,15 +92,14 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     elif any(value * end < 0 for value in values):
         yield f"expected strains of the sign of the path, which ends at {end:g}"
     elif is_strain and (largest := max(map(abs, values))) > abs(end) * (1 + path_curves.SAME_LOAD):
-        hint = "; in per cent?" if 50.0 <= largest / abs(end) <= 200.0 else ""
+        hint = "; in per cent?" if 5.0 <= largest / abs(end) <= 200.0 else ""
         yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}{hint}"
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
     """Return, by name, the result numbers that a study of scatter reports.
 
-    These are the constants of a stiffness, the entries of a conductivity, the onset and peak of a path, and the numbers
-    at the points of other analyses.
+    They are a stiffness's constants, a conductivity's entries, onset and peak of a path, or numbers of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:

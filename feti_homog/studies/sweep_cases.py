@@ -151,10 +151,10 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the sweep cases, unchecked, with their documents; [] after faults, which are appended to `faults`.
 
-    The cases run through all points; further `realisations`, if not None, follow, only of points with a random cell.
+    The cases run through all points; further `realisations`, if not None, follow at points with a random cell.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
-    if realisations is not None and not any(map(_is_random, documents)):
+    if realisations is not None and documents and not any(map(_is_random, documents)):
         faults.append(f'[{sections.SWEEP}] realisations: only cells with geometry = "random" have several')
     keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
     if realisations is not None and "cell.seed" in keys:

@@ -21,8 +21,7 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 class Statistics:
     """The statistics (points, ...) of outputs over finished realisations.
 
-    `ci95` is half the width of the 95 % confidence interval of the mean, by Student's t.  `ci95` and `std` are NaN for
-    fewer than two realisations.
+    `ci95` is half the 95 % confidence interval of the mean, by Student's t; NaN, like `std`, below two realisations.
     """
 
     count: Float
@@ -32,7 +31,7 @@ class Statistics:
 
     @classmethod
     def of(cls, samples: Float) -> Self:
-        """Compute statistics over the first axis of samples (n, ...), without NaN entries."""
+        """Compute statistics of the finite samples (n, ...) over the first axis."""
         is_known = np.isfinite(samples)
         count = is_known.sum(axis=0)
         several = np.where(count > 1, count, np.nan)
@@ -47,7 +46,7 @@ class SweepTable:
 
     Attributes:
         name, stress_unit: as in the sweep.
-        folder, point, realisation, status, reason: values for each case; `reason` explains a failure.
+        folder, point, realisation, status, reason: values for each case; `reason` explains a missing or partial result.
         inputs: value of each case by dotted key, None if the key does not vary in the case.
         outputs: values (cases,) by name, NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
@@ -144,7 +143,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A series of sweep points (numbers) that differ by one key and its functions; `x` has the ascending values."""
+    """The numbers of sweep points that differ by one key and by functions of it; `x` has its ascending values."""
 
     label: str
     points: list[int]

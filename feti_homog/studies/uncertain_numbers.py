@@ -51,31 +51,33 @@ class Uncertainty:
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers, and leave their means in the document; append all faults to `faults`."""
-    table = document.pop(sections.UNCERTAINTY, {})
+    """Extract the uncertain numbers, and leave their means in the document.
+
+    Appends all faults to `faults`; the result then has no numbers, or impossible correlations.
+    """
+    section = sections.UNCERTAINTY
+    table = document.pop(section, {})
     if not isinstance(table, dict):
-        name = sections.UNCERTAINTY
-        faults.append(f"{name} = {wording.toml_value(table)}: expected a section [{name}]")
+        faults.append(f"{section} = {wording.toml_value(table)}: expected a section [{section}]")
         return Uncertainty({})
     stds = toml_files.leaves({name: value for name, value in table.items() if name != sections.CORRELATION})
     given = [(path, value) for path, value in stds if value != {}]
-    for section in document:
-        document[section] = _means(document[section], (section,), given, faults)
+    for name in document:
+        document[name] = _means(document[name], (name,), given, faults)
     if len(given) > types.MOST_SECTIONS:
-        faults.append(
-            f"[{sections.UNCERTAINTY}]: {len(given)} uncertain numbers; expected at most {types.MOST_SECTIONS}"
-        )
+        faults.append(f"[{section}]: {len(given)} uncertain numbers; expected at most {types.MOST_SECTIONS}")
         return Uncertainty({})
     paths, named = [path for path, _ in given], {".".join(path): value for path, value in given}
     for path, value in dict(given).items():
-        name = f"[{sections.UNCERTAINTY}] {wording.dotted_key(path)}"
+        name = f"[{section}] {wording.dotted_key(path)}"
         if paths.count(path) > 1:
             faults.append(f"{name}: its standard deviation is given twice")
         if not types.is_number(value) or value <= 0:
             words = f"expected a standard deviation above 0{types.hint(value)}"
             faults.append(f"{name} = {wording.toml_value(value)}: {words}")
         elif number_at(document, path) is None:
-            faults.append(f"{name}: expected a key of the case whose value is a number")
+            hint = f"; write {wording.dotted_key(path[:-1])} = {value:g}" if path[-1] == "std" else ""
+            faults.append(f"{name}: expected a key of the case whose value is a number{hint}")
         elif path[0] == "material" and path[2:3] == ("strength",):
             faults.append(f"{name}: no result whose scatter is given depends on it; expected a number alone")
     pairs = table.get(sections.CORRELATION, [])
@@ -85,7 +87,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
     # The rounding error of an eigenvalue is at most n eps times the norm, which is at most the order n.
     if named and np.linalg.eigvalsh(result.matrix()).min() < -(len(named) ** 2) * np.finfo(float).eps:
-        place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION}"
+        place = f"[{section}] {sections.CORRELATION}"
         faults.append(f"{place}: these correlations are impossible; expected a positive semidefinite matrix")
     return result
 
@@ -109,7 +111,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 def _means(
     value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
 ) -> Any:
-    """Replace uncertain numbers in a value by means; append paths and deviations to `given`, lines to `faults`."""
+    """Return a value with means of its uncertain numbers; append (path, deviation) to `given`, lines to `faults`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]

@@ -1,8 +1,7 @@
 """Compute the scatter of results due to uncertain inputs, beside the scatter of random cells and the mesh error.
 
-Derivatives are exact where results have them, otherwise central differences between runs one standard deviation
-below and above the mean.  A random cell may change its arrangement between these runs: then the standard error of the
-slopes over the cells is large.
+Derivatives are exact where results have them, else central differences of runs one standard deviation off the mean.
+A random cell may change its arrangement between these runs: then the slopes have a large standard error over the cells.
 
 DIR/means                     sweep folder: the case, or all realisations of a random cell
 DIR/differences               two cases for each number without exact derivatives
@@ -173,14 +172,14 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 
 def is_study(values: Mapping[str, Any]) -> bool:
-    """Return whether a document has uncertain numbers, sound or faulty."""
+    """Return whether a document has a section [uncertainty] or uncertain numbers; both may be faulty."""
     document, faults = toml_files.to_document(values), list[str]()
     is_named = sections.UNCERTAINTY in document or bool(read_uncertainty(document, faults).std)
     return is_named or any(line.endswith(EXPECTED) for line in faults)
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return a placeholder datum for each number that all results have; of paths, load factors and peak components."""
+    """Return a placeholder datum for each number that all results have; paths give load factors and peak components."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone

@@ -27,7 +27,7 @@ NUMBERS = {
 class BondLaw(ABC):
     """The law of k bonds.  Numbers in its `section`, an [[interface]], are scalars or (k,).
 
-    If `has_toughness`, a break dissipates the energy `lost`; if `has_tips`, result.json has energies at crack tips.
+    If `has_toughness`, breaks dissipate the energy `absorbed`; if `has_tips`, result.json has energies at crack tips.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -54,12 +54,12 @@ class BondLaw(ABC):
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
-        """Compute the modes psi (k,): 0 opens, pi/2 shears.  With toughness, tan^2 psi = G_II / G_I."""
+        """Compute modes psi (k,), 0 to pi/2: tan^2 psi = G_II / G_I with toughness, else (t_t^2 + t_a^2) / <t_n>^2."""
         pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
-        """Return the fracture energies per area (k,) in modes psi (k,).  Laws without toughness have 0."""
+        """Return the fracture energies per area (k,) in modes psi (k,): 0, except in `SpringEnergy`."""
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
@@ -76,7 +76,7 @@ class BondLaw(ABC):
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """Compute the spring energies per area G_I and G_II (k, 2): opening and shear."""
+        """Compute energies per area (k, 2): G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a)."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
@@ -85,7 +85,7 @@ class BondLaw(ABC):
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return the stiffness or strength (`kind`) of all components, (c,) or (k, c).  Missing keys give inf."""
+        """Return stiffnesses or strengths (`kind`), (c,) or (k, c): by default inf, axially the tangential value."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -141,7 +141,7 @@ def pulled(traction: Float) -> Float:
 
 
 def law_of(section: Mapping[str, Any]) -> BondLaw:
-    """Construct the law that a section [[interface]] names by `criterion`."""
+    """Construct the law that `criterion` in a section [[interface]] names; without this key, the default law."""
     module, name = bond_laws.LAWS[section.get("criterion", bond_laws.DEFAULT)].implementation.split(".")
     implementations = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
     law: BondLaw = getattr(implementations, name)(section)
@@ -151,7 +151,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
     """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,), if not None, selects softened laws.  Several sections or scattered strengths give arrays (p,).
+    `damage` (k,), if not None, softens the law.  With several sections or scattered strengths, its numbers are (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -174,7 +174,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    With traction t, compliances C_0 (intact) and C (damaged), and slip C_0 t + g, the fraction bears t - g / (C - C_0).
+    With shear traction t, intact and damaged compliances C_0 and C, and slip C_0 t + g, it is t - g / (C - C_0).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

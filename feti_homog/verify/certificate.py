@@ -29,7 +29,7 @@ DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, M
 class Certificate:
     """The findings of all laws that apply.  `title` names case, mesh and states.
 
-    `status` has the status and faults that the run reports; `unchecked` maps reasons to numbers that no law reads.
+    `status` quotes the status and faults from the run; `unchecked` maps reasons to the numbers that no law reads.
     """
 
     findings: tuple[Finding, ...]
@@ -60,7 +60,7 @@ class Certificate:
 
 
 def verify(directory: Path) -> Certificate:
-    """Return a folder's certificate.  Raises CaseError for damaged files, FetiHomogError for missing permissions."""
+    """Certify a result folder.  Raises CaseError for faulty files, FetiHomogError or PermissionError without access."""
     # Damaged numbers may demand any memory and time: the limits are five times the needs of results of 3 to 5 MB.
     size = sum(path.stat().st_size for path in (directory / JSON, directory / FIELDS) if path.is_file())
     seconds = input_files.LEAST_SECONDS + size / input_files.BYTES_A_SECOND

@@ -34,7 +34,7 @@ MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
-    """Check that elements fill the cell, and that torn sides lie in pairs or at voids.
+    """Check that elements fill the cell, and that torn sides lie in pairs, at voids or on the cell boundary.
 
     Also check that areas are positive, and that sizes, counts and fractions in result.json agree with the mesh.
     """
@@ -140,7 +140,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
 
 
 def _tangents(points: Float, frame: Float, places: Float) -> Float:
-    """Compute dx / dt (s, q, 2), t in [0, 1], along sides, at `places` 2 t - 1 (q,) in [-1, 1].
+    """Compute the tangents dx / dt (s, q, 2) of sides x(t), t in [0, 1], at `places` 2 t - 1 (q,).
 
     The nodes of the sides are `points` (s, n, 2), ends first.  A side is an elliptic arc, the image of a unit arc under
     its `frame` (s, 2, 2); without a frame (NaN) it is the circular arc through its three nodes, or straight.
@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Mark nodes (k,) inside arcs and outside all arcs, but none at tips; `opening` is the default angle in degrees."""
+    """Return masks (k,), inside arcs and outside all arcs, False at tips; `opening` is the default angle in degrees."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
@@ -197,7 +197,7 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check energy release rates G = G_I + G_II and modes psi, and places and lengths of tips."""
+    """Check release rates G = G_I + G_II, modes psi with tan^2 psi = G_II / G_I, and places and lengths of tips."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load"
     G, first, second, psi, length, angle, number, load = (np.array(tips[name]) for name in names)
@@ -240,7 +240,7 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     r = MIDDLES if is_linear else quadrature_points()  # (q, 3) barycentric coordinates
 
     def stresses() -> Iterator[tuple[slice, Float, Float]]:
-        """Yield batches of elements: weights (e, q), and stresses (e, q, v) at the points `r`."""
+        """Yield slices of elements, with weights (e, q), and stresses (e, q, v) at the points `r`."""
         free = state.temperature * cell.expansions
         for part, _, w, _, _, stress in elements.responses(state.displacement, state.along, free):
             yield part, w * np.ones(len(r)) * w.shape[1] / len(r), stress * np.ones((len(r), 1))

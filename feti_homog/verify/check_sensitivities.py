@@ -83,10 +83,10 @@ def _parameters(cell: DiscreteCell) -> set[str]:
 
 
 def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], slope: Float, direction: Float) -> None:
-    """Check effective constants and their derivatives `slope`, (v, v) or (6, 7), along `direction` (parameters,).
+    """Check effective constants, and their derivatives along `direction` (parameters,).
 
-    At fixed contact status, energies are stationary, which gives the derivatives of the diagonal C_kk.  Others need
-    fields under other loads with the same status, which are not in the files: there only values are checked.
+    `slope`, (v, v) or (6, 7), has derivatives of `_energies`.  At fixed contact status it gives derivatives of C_kk;
+    other constants need fields under other loads with this status, which no file has: only their values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
     k, heat = document.get("effective_conductivity"), document.get("thermal_stress")
@@ -170,7 +170,7 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """Compute mutual energies per area of strain states with all states, (v, v) or (6, 7), by constants of `case`."""
+    """Compute <sigma_j : eps_i> plus springs, (v, v) or (6, 7), of strain states i and all states j, for a `case`."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)

@@ -26,7 +26,7 @@ ROUNDED = 1e-4
 
 
 def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check stresses, their averages, Hill's lemma (8) and S33.  `fields` follow from the displacements."""
+    """Check stresses, averages, S33, and Hill's lemma: <sigma : eps> = Sigma : E - (interface work) / (cell area)."""
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
@@ -38,8 +38,7 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
     jump = cell.in_axes(state.jump)
     integrals = (cell.elements.node_integrals + cell.void_integrals + cell.side_integrals)[cell.nodes.node]
-    # A void adds its fraction of E and int sym(u* (x) n) ds, a closed integral even where the cell boundary cuts the
-    # void.
+    # A void adds its fraction of E and int sym(u* (x) n) ds, a closed integral even in voids that the cell sides cut.
     slope = state.fluctuation.T @ cell.void_integrals - jump.T @ cell.faces.sums(integrals, of_fibre=False)
     openings = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
     strain = (weights * fields.strain).sum(axis=0) / area + openings
@@ -246,7 +245,7 @@ def _measures(stress: Float, strength: Mapping[str, Any] | None) -> dict[str, Fl
 
 
 def _hashin(stress: Float, limit: Mapping[str, float]) -> list[Float]:
-    """Compute the utilisations 1 / f (n,) of `MODES`, with the load factor f at failure."""
+    """Compute Hashin's utilisations (n,) by `MODES`: 1 / load factor at failure, or 0 where a mode does not apply."""
     zero = SAME_PLACE * float(np.abs(stress).max(initial=0.0))  # both matrix modes count near S11 + S22 = 0
     shear = (stress[:, 0, 2] ** 2 + stress[:, 1, 2] ** 2) / limit["axial_shear"] ** 2
     along, across = stress[:, 2, 2], stress[:, 0, 0] + stress[:, 1, 1]

@@ -70,7 +70,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Return 6 machine eps times the largest ratio of volumetric to least compliance, and times the contrast."""
+    """Return 6 machine eps times max S_iijj / (3 min eig S) of compliances S, and times the stiffness contrast."""
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
@@ -115,7 +115,7 @@ def _given_stiffness(constants: Constants) -> Float:
 
 
 def _compliance(constants: Constants) -> Float:
-    """Compute the compliance S (6, 6) in the material axes.
+    """Compute the compliance S (6, 6) in the material axes; (3, 3) if the given stiffness is (3, 3).
 
     Young's moduli along three axes, ratios 12, 13, 23 and shear moduli 23, 13, 12 determine S; plane stress needs fewer
     constants, and the others have arbitrary stable values.
@@ -155,7 +155,7 @@ def turned(stiffness: Float, degrees: float) -> Float:
 
 
 def _turn(degrees: float, axes: int) -> Float:
-    """Compute the rotation matrix R (axes, axes) from x1 to x2."""
+    """Compute the matrix R (axes, axes) of the rotation by `degrees` from x1 to x2."""
     angle, turn = np.radians(degrees), np.eye(axes)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

@@ -47,13 +47,13 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """Sum values (b, c) over the copies on the matrix face, or the face `of_fibre`: (k, c)."""
+        """Sum values (b, c) over the copies on one face, the fibre face if `of_fibre`.  Returns sums (k, c)."""
         on_face = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
         return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """Average values (b, c) over the subdomains on a face, as in `sums`: (k, c), NaN without a subdomain."""
+        """Average values (b, c) over the subdomains on a face, as in `sums`.  Returns (k, c), NaN without subdomain."""
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)
@@ -128,7 +128,7 @@ class DiscreteCell:
 
     @property
     def porosity(self) -> float:
-        """Return the area fraction of voids.  It is 0 if every torn side has a partner."""
+        """Return the area fraction of voids.  It is 0 if no torn side is at a void."""
         return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
 
     @cached_property
@@ -209,7 +209,7 @@ class DiscreteCell:
 
     @cached_property
     def _scales_on_path(self) -> list[Scales]:
-        """Return the scales of all path points with friction, which keeps earlier rounding; else []."""
+        """Return the scales of all path points if there is friction, which keeps earlier rounding errors; else []."""
         points = self.files.document.get("path", ()) if friction_at(self.files).any() else ()
         return [self.scales(np.array(point["strain"]), float(point.get("temperature", 0.0))) for point in points]
 

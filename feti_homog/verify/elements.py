@@ -1,4 +1,4 @@
-"""Compute strains, stresses and forces of triangles with three or six nodes, for the certificate alone.
+"""Compute strains, stresses and forces of triangles with three or six nodes, only for the certificate.
 
 Displacements have c = 2 components, or 3 in generalized plane strain and conduction; strains and stresses have v = 3 or
 6, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].  In barycentric coordinates r, the shape functions are N_a =
@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu and the largest (mu of any phase) / mu over mixed phases, or (0, 0)."""
+        """Return the largest lambda / mu and contrast max(mu) / mu of mixed phases; (0, 0) without mixed phases."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -106,7 +106,7 @@ class Elements:
     def responses(
         self, displacement: Float, along: float, free: Float
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
-        """Yield batches of elements: gradients, weights, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
+        """Yield slices of elements, with gradients, weights, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
         v = self._stiffnesses.shape[1]
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]
@@ -125,7 +125,7 @@ class Elements:
             yield part, gradients, weights, slope, local, answer
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
-        """Yield batches of elements: gradients dN_a/dx (e, q, a, 2) and weights (e, q) of quadrature.
+        """Yield slices of elements, with gradients dN_a/dx (e, q, a, 2) and quadrature weights (e, q).
 
         Linear elements have one point, quadratic elements Dunavant's rule of degree 4 (1985) at `quadrature_points`.
         """
@@ -176,9 +176,10 @@ def add_at_nodes(sums: Float, nodes: Int, values: Float) -> None:
 
 
 def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -> tuple[Float, Float]:
-    """Compute du_i/dx_d (e, q, 2, 2) of the bubbles, and the pressures (e, q).
+    """Compute du_i/dx_d (e, q, 2, 2) of the bubbles b, and the pressures p (e, q), which are linear.
 
-    Arguments: dN_a/dx (e, q, 6, 2), weights (e, q), elastic strains (e, q, v) without bubbles, lambda and mu (e, 2).
+    They solve int sigma grad b = 0 and int r_a (p - lambda tr eps) = 0.  Arguments: dN_a/dx (e, q, 6, 2), weights
+    (e, q), elastic strains (e, q, v) without bubbles, lambda and mu (e, 2).
     """
     (first, shear), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)

@@ -1,9 +1,8 @@
 """List the laws of the certificate with their limits, record violations, and find numbers that no law reads.
 
-Rounding.  Sums over fields err by a few units in the last place of their terms; quantities from factorizations in the
-solver err by a few hundred: forces in a mesh with 119 000 elements by at most 1.3e-12.  In a very stiff phase, where
-strains are differences of nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand
-times the measured errors.
+Rounding.  Sums over fields err by a few units in the last place of their terms; quantities from factorizations err
+by a few hundred: forces in a mesh with 119 000 elements by at most 1.3e-12.  In a very stiff phase, where strains are
+differences of nearly equal displacements, rounding is 1e-15 of the terms.  Limits are 10 to 1000 times these errors.
 
 Solver.  The Krylov method leaves relative jumps of `rtol`; laws of closed faces hold to the tolerance of the checks in
 a run, min(1000 rtol, 1e-4).  As `rtol` is an entry of the result, 1e-4 bounds the tolerance that a result may claim.
@@ -121,7 +120,7 @@ def solver_limit(rtol: float) -> float:
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
     """List the laws with their limits for a tolerance `rtol` of the dual problems, without violations.
 
-    Users' meshes, coatings, and the numbers `phases`, of `Elements.contrasts` and of `rounding`, widen the limits.
+    Users' meshes and coatings widen the limits, and so do `phases`: two `Elements.contrasts`, then two of `rounding`.
     """
     ratio, contrast, of_law, of_contrast = phases[0] / LARGE_RATIO, *phases[1:]
     # Factors by which nearly incompressible phases raise the limits.

@@ -49,8 +49,8 @@ class PointNumbers:
     def of(cls, cell: DiscreteCell, number: int, load: Prescribed, state: StateNumbers | None) -> Self:
         """Collect the numbers of a point, from its `state` if there is one, else from result.json.
 
-        Without a state at temperature 0, Hill's lemma (8) gives the stored energy E.Sigma / 2, and the conjugate is NaN
-        if there are expansions; at other temperatures, it follows from the stored energy in the file.
+        Without a state, at temperature 0, the stored energy is E.Sigma / 2, and the conjugate of temperature is NaN
+        if there are expansions; at other temperatures, this conjugate follows from the stored energy in the file.
         """
         point, n = cell.files.document["path"][number], len(load.values)
         strain, stress, name = np.array(point["strain"]), np.array(point["stress"]), f"path[{number}]"
@@ -81,7 +81,6 @@ class PointNumbers:
 def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check dissipation under strain control and, without temperature and friction, stored energies E.Sigma / 2."""
     points = cell.files.document["path"]
-    # The stored energy is E.Sigma / 2 without temperature and friction.
     with_fields = {state.point for state in states}
     scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
     for number, point in enumerate(points):
@@ -149,7 +148,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: StateNumbers
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Return lower and upper bounds (P) of the potential by a state `other`; infinite if other stresses are given."""
+    """Bound the potential of `load` from below and above by the state `other`; infinite if `by_stress` differs."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
@@ -181,9 +180,9 @@ def _work(prescribed: Float, conjugate: Float) -> float:
 def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the work, and the loss in breaks by (P).
 
-    The loss is the potential with the old bonds minus the potential with the new bonds, at the load of the break: after
-    the point of an event, or at the end of an increment.  There, Voigt's mean stiffness at the new strain stores at
-    least as much as the cell with the old bonds.
+    The loss is the potential with old bonds minus the potential with new bonds, at the load of the break: after an
+    event point, or at the end of an increment.  There, Voigt's mean stiffness at the new strain stores at least as much
+    as old bonds.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)

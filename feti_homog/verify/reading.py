@@ -27,9 +27,9 @@ COATING = "coating"  # name of the phase
 
 @dataclass(frozen=True)
 class Mesh:
-    """The mesh: nodes (n, 2) and elements (m, 3 or 6).
+    """The mesh: nodes (n, 2), elements (m, 3 or 6), and their subdomains, phases and bodies (m,).
 
-    An element lists its vertices, then the mid-side nodes 01, 12, 20.  Subdomains share no node; phase 0: matrix.
+    An element lists its vertices, then the mid-side nodes 01, 12, 20.  Subdomains share no node; phase 0 is the matrix.
     """
 
     points: Float
@@ -89,7 +89,7 @@ class State:
         status: (k,) values of `Status`.
         damage: (k,) from 0 (intact) to 1 (broken).
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
-        mesh_error: (m,) share of an element in the estimated energy error, NaN without an estimate.
+        mesh_error: (m,) estimated energy error of an element / energy of the cell, NaN without an estimate.
     """
 
     name: str
@@ -195,7 +195,7 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Return the names of files changed since the run.  Raises CaseError if a file is unreadable."""
+    """Return the names of files changed since the run.  Raises like `_document`; OSError if result.h5 is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         has_fields = document["case"].get("output", {}).get("fields", False)
@@ -236,7 +236,7 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    """Read result.json.  Raises CaseError if it is damaged or has another schema, and like `input_files.unreadable`."""
+    """Read result.json.  Raises CaseError for a missing, damaged or older file, FetiHomogError without permission."""
     try:
         document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:

@@ -1,7 +1,8 @@
 """Evaluate cohesive laws t(delta) of the opening delta, with damage d = 1 - t / (K delta) from the onset delta_0 on.
 
 K is the stiffness of a mode psi, 0 (opening delta_n) to pi/2 (slip delta_s): K (delta_n^2 + delta_s^2) = k_n delta_n^2
-+ k_t delta_s^2.  Damage grows in steps, the teeth.  A branch gives t / peak at u = (delta - delta_0) / stretch.
++ k_t delta_s^2.  Damage grows in steps, the teeth.  With the peak K delta_0, a branch gives t / peak at
+u = (delta - delta_0) / stretch; the stretch makes the area under t(delta) equal to the toughness of the mode.
 """
 
 from abc import abstractmethod
@@ -31,7 +32,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section.get("damage", 0.0), float)
 
     def jumps(self, traction: Float) -> Float:
-        """Compute the jumps t / ((1 - d) k) (k, c), with d = 0 for normal compression."""
+        """Compute the jumps t / ((1 - d) k) (k, c), with d = 0 for normal compression and broken bonds."""
         share = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
         shares = np.repeat(share, traction.shape[1], axis=1)
         shares[:, 0] = np.where(traction[:, 0] > 0.0, shares[:, 0], 1.0)
@@ -59,7 +60,7 @@ class Cohesive(QuadraticStrength):
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """Compute traction components / strengths (k, c); all slips of equal energy have equal shares."""
+        """Compute traction / strength (k, c), slips times sqrt(k_t / k_c): slips of equal energy have equal shares."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -69,7 +70,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,) at openings in a constant ratio, in the mode with the larger end / delta_0."""
+        """Compute damage levels (n + 1,) of n teeth at openings in one ratio, in the mode with larger end / onset."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
@@ -106,7 +107,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """Compute K, delta_0 and stretch, all (k,), in modes psi (k,)."""
+        """Compute K, delta_0 and stretch = (G_c - K delta_0^2 / 2) / (K delta_0 under(inf)) (k,) in modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt
@@ -120,7 +121,7 @@ class Cohesive(QuadraticStrength):
         return K, first, rest / (K * first * self.under(np.asarray(np.inf)))
 
     def _area(self, d: Float, K: Float, first: Float, stretch: Float) -> Float:
-        """Compute the area (k,) under t(delta) up to damage d (k,), without the triangle of unloading."""
+        """Compute the area (k,) under t(delta) up to damage d (k,), minus the energy that unloading returns."""
         low = np.zeros(np.broadcast_shapes(np.shape(d), np.shape(first)))
         high = low + 1.0
         while ((1.0 - d) * (first + stretch * high) < first * self.branch(high)).any() and high.max() < 1e6:

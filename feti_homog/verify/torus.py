@@ -112,7 +112,7 @@ def same_places(points: Float, shift: Float | None, radius: float) -> Int:
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
     """Return whether two bodies meet along one line at places (places,).
 
-    `part` (m,) is the body of an element.  There four ends of sides meet, not all `alone`; middle nodes always fit.
+    `part` (m,) is the body of an element.  Such places have four ends of sides, not all `alone`, or a middle node.
     """
     apart = ~sides.alone & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)

@@ -65,6 +65,7 @@ def test_loose_tolerance(tmp_path):
     job = command_line(2, "run", case_file(tmp_path), "--out", out, "-feti_ksp_rtol", "0.3", *IMPLICIT)
     document = json.loads((out / "result.json").read_text())
     assert job.stdout.count("warning: -feti_ksp_rtol 0.3 asks for less") == 1
+    assert job.stdout.count("Warning     -feti_ksp_rtol 0.3 asks for less") == 1  # again in the summary at the end
     assert any("-feti_ksp_rtol 0.3" in warning for warning in document["warnings"])
     assert max(document["checks"].values()) > document["check_tolerance"] == 1e-4
     assert job.returncode == 3 and document["status"] == "not converged"

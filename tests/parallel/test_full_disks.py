@@ -146,6 +146,17 @@ def test_pictures_that_do_not_fit_are_reported(comm, shared_path, capsys):
     assert (out / "path.gif").read_text() == "old" and not list(out.glob("*.part"))
 
 
+def test_ranks_share_the_pictures_and_report_one_that_does_not_fit(comm, shared_path, capsys):
+    """The second picture, which the second rank draws."""
+    names, out = ["case_E11.png", "case_E22.png", "case_gamma12.png", "cell.png"], shared_path / "out"
+    pictured = CASE.replace("pictures = false", "mesh_error = false")
+    with no_space_for("partition.png"):
+        parallel_assert(comm, run(comm, shared_path, out, pictured) == 1)
+    told_once(comm, capsys, "error: cannot write ", "partition.png: No space left on device")
+    parallel_assert(comm, run(comm, shared_path, out, pictured) == 0)
+    parallel_assert(comm, sorted(path.name for path in out.glob("*.p*")) == [*names, "partition.png"])
+
+
 def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
     """A few states fit; the path is followed to its end all the same, and --resume makes the fields of it."""
     out = shared_path / "out"

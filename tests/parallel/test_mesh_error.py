@@ -1,5 +1,7 @@
 """Estimated errors of the mesh against true ones, at any number of ranks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -12,6 +14,7 @@ from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.uniform_parts import nested_interiors
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -136,16 +139,14 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
 
 
 @pytest.mark.parametrize("refine", [0, 1])
-def test_without_states_nothing_is_kept_and_errors_are_the_same(comm, refine):
+def test_interiors_are_kept_for_many_states_alone_and_errors_are_the_same(comm, refine):
     cell, _, responses = solve(make_case(order=2, mesh_size=0.2, refine=refine), comm)
     kept = cell.solver.interface_operators.interiors
-    lean = energy_errors(cell, responses, keep=False)
-    assert not kept and "nested_interiors" not in vars(cell) and not len(lean.shares)
-    whole = energy_errors(cell, responses)
-    if refine:
-        assert not kept and sum(len(each.members) for each in cell.nested_interiors) == len(cell.subdomains)
-    else:
-        assert len(kept) == len(cell.subdomains)
+    lean = energy_errors(cell, responses)
+    assert not kept
+    many = replace(cell, case=replace(cell.case, analysis=replace(cell.case.analysis, type="angle")))
+    whole = energy_errors(many, responses)
+    assert len(kept) == (0 if refine else len(cell.subdomains))
     np.testing.assert_allclose(lean.elements, whole.elements, rtol=1e-9, atol=1e-12 * whole.elements.max())
     np.testing.assert_allclose(lean.arcs, whole.arcs, rtol=1e-9, atol=1e-12 * np.abs(whole.arcs).max())
     shares = comm.allreduce(whole.shares.sum(axis=0))
@@ -175,7 +176,7 @@ def test_bodies_of_a_phase_together_have_the_errors_of_each():
     found = energy_errors(cell, responses, nested=False)
     u, loads = (np.stack([getattr(each, name) for each in responses], axis=1) for name in ("u", "strain"))
     elements, arcs, shares = np.zeros((3, 3)), np.zeros((3, 3)), [np.zeros((0, 3))]
-    for part, own in cell.displacements(u, loads):
+    for part, own in cell.by_part(cell.extended(u, loads)):
         body = RecoveredStress.on(part.mesh, part.L, part.problem, own.reshape(-1, 2, 3), loads, part.is_mixed)
         total, each = body.difference()
         elements += total / cell.summary.area
@@ -207,7 +208,7 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     k, nested = len(responses), cell.nested_lattice.within(cell.lattice)
     fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
     largest = 0.0
-    for interior in cell.nested_interiors:
+    for interior in nested_interiors(cell.solver.interface_operators, cell.lattice, cell.nested_lattice):
         coarse, first = interior.displacement(u, loads), 0
         for s in interior.members:
             there = next(fine).reshape(-1, 2, k)[s.mesh.node_class[s.mesh.nodes[:, nested]]]

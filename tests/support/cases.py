@@ -50,7 +50,7 @@ def case_of(cell, folder=".", **sections):
 class Responses:
     """Takes the responses that are to be kept as states, in place of `StateRecorder`."""
 
-    has_place = False
+    is_recording = False
 
     def __init__(self):
         self.taken = []

@@ -5,8 +5,8 @@ Eliminating the coarse displacements Z_0 (`geneo.AveragedModes`) turns the bound
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
 and the preconditioner is H_0 = B_D S_0 B_D^T, B_D = W^-1 B D^-1 (`preconditioners`).  As B Z_0 = 0, H_0 inverts the
-dual operator if Z_0 spans all displacements of the glued cell (T9), and removes the soft modes that Z_0 spans from the
-Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is semi-definite; it couples a subdomain's neighbours.
+dual operator if Z_0 spans all displacements of the glued cell (THEORY.md, T9), and keeps the soft modes in Z_0 out of
+the Krylov method (Spillane & Rixen, IJNME 95, 2013).  Z_0^T S Z_0 is semi-definite; it couples up to second neighbours.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Compute the soft modes, and factor the coarse problem.  Collective.
 
-        Soft modes have eigenvalues theta < `threshold` (`local_eigenproblems`).  Boundary operators must be dense where
+        Soft modes have theta < `threshold`, see module `local_eigenproblems`.  Boundary operators must be dense where
         `operators.facewise` is false.  Options with the prefix `feti_coarse_` are as in `DistributedSolver`.
 
         Raises:
@@ -159,7 +159,7 @@ class AdaptiveCoarseSpace:
         return forces
 
     def solve(self, work: Float) -> Float:
-        """Solve Z_0^T S Z_0 c = w for c (u, k), with w the sum of `work` (u, k) over ranks.  Collective."""
+        """Solve Z_0^T S Z_0 c = w for c (u, k); w is the sum of `work` (u, k) over ranks.  Collective."""
         with self._solve_event:
             right = distributed_arrays.scale_rows(self._weights, work)
             return distributed_arrays.scale_rows(self._weights, self.solver.solve(right))

@@ -73,7 +73,7 @@ def trace_space(
 def _every_second(n: int, c: int, pairs: bytes) -> csr_matrix:
     """Build the prolongation (c n, c m) from every second boundary vertex; `pairs` (2, e) are the ends of edges.
 
-    The pieces of a label image have few different boundaries.
+    Results stay in a cache, because the pieces of a label image have few different boundaries.
     """
     rows, columns = np.frombuffer(pairs, np.int64).reshape(2, -1)
     beside = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()

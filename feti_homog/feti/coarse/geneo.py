@@ -72,9 +72,7 @@ class AveragedModes:
         """Compute the averaged modes Z_0 (boundary dofs, m) on local subdomain i.
 
         The kernel of subdomain i has no energy and is left out, so that motions of stiff subdomains keep all digits.
-
-        Args:
-            BW: (rows, boundary dofs) scaled constraints of the subdomain on the active rows, see `scaled_constraints`.
+        `BW` (rows, boundary dofs) has the subdomain's part of `scaled_constraints`, on the active rows.
         """
         columns, kernel = self.columns[i], self._blocks[i].R.shape[1]
         jump = np.zeros((self._sizes[i], len(columns)))
@@ -99,7 +97,7 @@ class AveragedModes:
 def subdomain_blocks(
     operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1, at `Neighbours.rows`.  Collective."""
+    """Cut the blocks of every local subdomain out of B and W^-1 B D^-1; `rows` are `Neighbours.rows`.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
@@ -110,7 +108,7 @@ def subdomain_blocks(
 
 
 def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
-    """Compute W^-1 B D^-1 of `preconditioners` (local rows, boundary dofs), 0 on inactive rows.  Collective."""
+    """Compute W^-1 B D^-1 (local rows, boundary dofs) from `scaling`, 0 on inactive rows.  Collective."""
     jump_operator = scaling.jump_operator
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()

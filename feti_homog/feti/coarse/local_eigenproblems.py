@@ -110,10 +110,10 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """Compute the soft face modes (n, m) with theta < `face_factor` x `threshold`.
+        """Compute the soft face modes (n, m) with theta < `Thresholds.face_factor` x `threshold`.
 
-        `shares` are the neighbours, with their parts of M^-1 on the common rows.  S+ extends a face mode to the whole
-        boundary; displacements below `decayed` times the largest are set to 0.
+        `shares` has the neighbours, with their parts of M^-1 on the common rows.  S+ extends a face mode to the whole
+        boundary; displacements below `Thresholds.decayed` times the largest are set to 0.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
@@ -146,7 +146,7 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """Compute the forces N p (n, m), N = B^T M B, projected so that R^T N p = 0.
+    """Compute the forces f = N p (n, m), N = B^T M B, and project them to R^T f = 0.
 
     S+ N p is a step of inverse iteration, which turns an eigenvector p (n, m) of the trace space into a displacement of
     the body itself.  `R` (n, k) is the kernel.  The result has the precision of M.
@@ -162,18 +162,18 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for symmetric M (rows, rows)."""
+    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for P (n, m), R (n, k) and symmetric M."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the soft eigenvectors q (m, j): P^T S P q = theta P^T N P q with theta < `threshold`.
+    """Compute the soft eigenvectors q (m, j): P^T S_s P q = theta P^T N_s P q with theta < `threshold`.
 
     Args:
-        S: (m, m) P^T S P for the trace space P (n, m), regularised on the kernel of S.
-        N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
+        S: (m, m) P^T S_s P for the trace space P (n, m), regularised on the kernel R (n, k) of S_s.
+        N: (m + k, m + k) [P R]^T N_s [P R].
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]

@@ -95,14 +95,14 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return the matrix G^T A G; a row between two bodies stores 36 products.  Collective when first read.
+        """Return G^T A G, which stores 36 products for a row between two bodies.  Collective when first read.
 
-        Modes of the pinned body are left out: its pieces are glued to the pinned node class and cannot move.
+        Modes of the pinned body are left out: its pieces are glued together and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """Compute a basis (m, z) for the null space of G^T G on active rows.  Collective."""
+        """Compute a basis (m, z) for the null space of G^T G on rows where `active` (owned rows,) is 1.  Collective."""
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
@@ -126,7 +126,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x (owned rows,) or (owned rows, k), with 0 on inactive rows.  Collective."""
+        """Compute P x for x (owned rows,) or (owned rows, k) that is 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -185,7 +185,7 @@ class GramMatrix:
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
         """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        An eigenvalue of a group counts as zero up to the largest `tolerance` (m,) of its modes.
+        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) are 0.
         """
         padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]

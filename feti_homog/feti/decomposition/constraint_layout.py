@@ -198,9 +198,9 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Find the m interface nodes with their first copy in the outer body on this rank.
+        """Find the m interface nodes whose first copy is on this rank; the first copy is in the outer body.
 
-        Returns the first local row (m,) of each bond, and the local node number (m,) of each copy.
+        Returns the first local row (m,) of each bond, and the local node number (m,) of each first copy.
         """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]

@@ -118,9 +118,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) by rows of adjacent nodes to at least `enough` rows; return all rows, sorted.
+        """Extend global rows (k,) to at least `enough` rows at the same and adjacent nodes; return all rows, sorted.
 
-        `choose` filters the candidates.  The search also ends where it finds no further adjacent node.
+        `choose` selects new rows from candidates.  With no further adjacent node, the result may have fewer rows.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

@@ -196,7 +196,7 @@ class NodeBlocks:
             self.blocks.append((starts[chosen][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """Invert the blocks on rows where `active` (owned rows,) is 1: (owned rows, owned rows), 0 elsewhere."""
+        """Return the block inverse (owned rows, owned rows) on rows where `active` (owned rows,) is 1, 0 elsewhere."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

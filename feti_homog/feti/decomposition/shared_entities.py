@@ -44,9 +44,9 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 
 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
-    """Return the case interface (n,) of every shared entity, as in `SharedEntities.pair`.
+    """Return `SharedEntities.pair` (n,) of all shared entities; `pairs` is as in `share_entities`.
 
-    It is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
+    The pair is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -125,6 +125,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
     """Sum contributions of edges to vertices over all ranks: (n, k) on owned entities.  Collective.
 
     Edges with keys `edge` (p,) contribute `parts` (p, 2, k) to vertex classes `ends` (p, 2), except to pinned classes.
+    `owner` (n,) is the rank that owns each entity.
     """
     order, code = np.argsort(sharers.code), entity_code(ends, False)
     ordered = sharers.code[order]

@@ -19,7 +19,7 @@ from feti_homog.typing import Bool, Int
 
 @dataclass(frozen=True)
 class Sharers:
-    """The n entities that local subdomains share with other subdomains: vertices, then edges, sorted by key.
+    """The n entities that local subdomains share with other subdomains.
 
     Attributes:
         key: (n,) vertex class or torus edge.
@@ -56,12 +56,12 @@ class Sharers:
 
 
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
-    """Encode keys (n,) of vertex classes or torus edges as unique codes (n,), odd for edges."""
+    """Encode keys of vertex classes or torus edges as unique codes in an array of equal shape, odd for edges."""
     return np.asarray(2 * key + is_edge)
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Find the entities that local subdomains share, except pinned vertex classes.  Collective."""
+    """Find shared entities, except pinned vertex classes: vertices, then edges, sorted by key.  Collective."""
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1

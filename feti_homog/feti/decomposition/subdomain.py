@@ -19,14 +19,14 @@ class Subdomain:
     """One subdomain: a piece of a body, or of several bonded bodies.
 
     It has n node classes with c displacements each, and a kernel of dimension k.  K takes by far the most memory:
-    `build` assembles K, the first `take_stiffness` hands it over to its caller, and later calls assemble it anew.
+    `build` assembles K, the first `take_stiffness` hands K over to the caller, and later calls assemble K anew.
 
     Attributes:
         submesh: coarse mesh.
         mesh: refined mesh.
-        problem: components of the displacement, and unit loads.
-        L: (v, v) stiffness of the material, see `assemble`; with several materials, the mean over the area.
-        laws, material: arguments of `assemble`; with one material, `laws` is (1, v, v) and `material` None.
+        problem: the c displacements of a node, m displacement strains and v unit loads.
+        L: (v, v) stiffness of the material, see `assembly.assemble`; with several materials, the mean over the area.
+        laws, material: arguments of `assembly.assemble`; with one material, `laws` is (1, v, v) and `material` None.
         Q: (cn, v) unit loads, forces f = -Q E; with tractions t = Sigma n on the sides (cn, v + m), f = -Q [E, Sigma].
         slopes: (n, 2) int dN/dx; 0 at held classes.
         areas: (materials,) area of every material.
@@ -36,7 +36,7 @@ class Subdomain:
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
         is_outer: whether no other body lies around the body.
-        mixed: whether elements have a bubble and an internal pressure, see `assemble`.
+        mixed: whether elements have a bubble and an internal pressure, see `assembly.assemble`.
     """
 
     submesh: Submesh
@@ -70,7 +70,7 @@ class Subdomain:
     ) -> Subdomain:
         """Refine the submesh and assemble K and Q, without communication.
 
-        `laws`, `material` and `mixed` are as in `assemble`; `flags` are `is_thin` and `is_outer`.
+        `laws`, `material` and `mixed` are as in `assembly.assemble`; `flags` are `is_thin` and `is_outer`.
 
         Raises:
             MeshError: an element is inverted, or |K R| exceeds ZERO_TOLERANCE |K|.
@@ -131,10 +131,10 @@ class Subdomain:
         return subdomain
 
     def mean_strain(self, dofs: Int) -> Float:
-        """Compute weights w (k, m): w^T u is the contribution of u on `dofs` (k,) to the strain integral int eps*.
+        """Compute the weights w (k, m) of `dofs` (k,) in the integrals of the m displacement strains.
 
-        The integral covers the subdomain and its share of adjacent voids: int_Omega eps*, plus int u (x) n ds over the
-        boundaries of the voids, with n outward from the voids.
+        w^T u is the contribution of the displacements u to int eps over the subdomain, plus int u (x) n ds along its
+        edges at voids, with n outward from the voids: around a void, the sum is int eps over the void.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
@@ -148,7 +148,7 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L (v + m, v + m), padded with 0 for the m tractions on sides."""
+        """Return |Omega| L (v, v), with tractions on the sides padded by 0 to (v + m, v + m)."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C
@@ -167,8 +167,8 @@ class Subdomain:
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
         """Remove rounding from the displacements `answers` = -K+ Q (k, v) of `dofs` (k,).
 
-        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion.  K+
-        adds rounding in proportion to its stiffness, perhaps far above all forces.  Else, the result is `answers`.
+        If a body can turn and has no voids, its displacement under a strain E is -E x plus a rigid-body motion; else
+        the result is `answers`.  Rounding in K+ Q, times the stiffness of the body, may far exceed all forces.
         """
         if self.R.shape[1] < 3 or self.submesh.at_void.any():
             return answers
@@ -190,7 +190,7 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K where it scales jumps.
+        """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K that scales jumps.
 
         Single nodes of mixed elements are as stiff as lambda, boundary motions at constant volume only as mu.  The
         factor is 1 without mixed elements, and for several materials, which are all far from incompressible.  lambda
@@ -255,7 +255,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute an orthonormal kernel (cn, k): translations, and a turn if the body `rotates`; `held` nodes rest."""
+    """Compute an orthonormal kernel (cn, k) at n positions: translations, a turn if `rotates`; `held` nodes rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:

@@ -26,7 +26,7 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
-    """The preconditioner z = H r, with the inverse H of the projected dual operator on the active rows.
+    """The preconditioner z = H r; H is the inverse of the projected dual operator on the active rows.
 
     Attributes:
         neighbours: adjacent interface nodes.
@@ -85,7 +85,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Update followed columns to the next state.  Collective; returns False like `FollowedResponse.follow`."""
+        """Follow columns to the rows `active` with compliance `more`, like `FollowedResponse.follow`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -136,7 +136,7 @@ class ExactInverse(Preconditioner):
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
-        """Collect the changed rows, after a new reference cell if there are too many.  Collective."""
+        """Collect the changed rows; if there are too many, first factor a new reference cell.  Collective."""
         changes = self._changes()
         if len(changes.rows) - self._tie_count <= self._max_changes:
             return changes
@@ -148,7 +148,7 @@ class ExactInverse(Preconditioner):
         return self._changes()
 
     def _add_columns(self, rows: Int) -> None:
-        """Compute missing columns of the present response, at global rows (k,) and pins.  Collective."""
+        """Follow missing columns at global rows (k,) and pins; factor the cell anew if digits are lost.  Collective."""
         rows = np.union1d(rows, self._followed.pins)
         if not len(self._followed.lacking(rows)):
             return
@@ -161,7 +161,10 @@ class ExactInverse(Preconditioner):
     def _add(
         self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = thresholds.MOST_ROUNDING
     ) -> bool:
-        """Follow columns at global `rows`; `needed` ones stay.  False if asymmetry exceeds `max_error`.  Collective."""
+        """Follow columns at global `rows`; columns at `needed` rows stay.  Collective.
+
+        Returns False, and follows none, if `ReferenceChanges.error` of the columns exceeds `max_error`.
+        """
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
@@ -172,9 +175,9 @@ class ExactInverse(Preconditioner):
         return True
 
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
-        """Select global `rows` (k,) without columns, and active rows without columns near them.  Collective.
+        """Select rows without columns: the global `rows` (k,), and active rows nearby up to a full batch.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  If no row is active, none is added.
+        Neighbours of broken bonds break next, and columns are cheaper together.  If all are inactive, none is added.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
@@ -187,7 +190,7 @@ class ExactInverse(Preconditioner):
 
     @property
     def rounding(self) -> float:
-        """The relative rounding error of the reference cell's H.  Collective when first read for a reference cell.
+        """Return the relative rounding error of the reference cell's H.  Collective when first read for this cell.
 
         Jumps of unit rigid-body motions cause no forces: the error is the largest H r / `stiffness` of such jumps r.
         """
@@ -197,7 +200,7 @@ class ExactInverse(Preconditioner):
         return self._rounding
 
     def apply(self, r: Float) -> Float:
-        """Compute H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
+        """Compute H r for r (owned rows,) or (owned rows, k), 0 on inactive rows; may factor the cell.  Collective."""
         z = self._up_to_date().refined(self._of_reference(r if r.ndim == 2 else r[:, None]))
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
@@ -214,7 +217,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Returns None unless `free` pins exist; the cell is then factored anew if it has changed.
+        possible positions.  Unless `free` pins exist, a changed cell is factored anew, and the result is None.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -226,7 +229,7 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Store and return the answer U (owned rows, v) by the response of the reference cell to `d`.  Collective.
+        """Compute U (owned rows, v) anew from the reference cell's response to `d`; store and return U.  Collective.
 
         `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
         rounding from earlier updates.

@@ -108,9 +108,9 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
-        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2), which count as used.  Collective.
+        """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
 
-        Both rows of a pair belong to one rank.  Raises ValueError if a row has no column.
+        Both rows of a pair belong to one rank; their columns count as used.  Raises ValueError if a row has no column.
         """
         if len(self.lacking(pairs)):
             raise ValueError("blocks of the response: expected rows with columns")
@@ -156,7 +156,7 @@ class FollowedResponse:
         return all(self._turn(rows[part], signs[part], gains[part], pivot) for part in parts if len(part))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns, like `follow`, for springs (k,) that gain compliance `more` (k,).  Collective."""
+        """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
@@ -249,8 +249,8 @@ class FollowedResponse:
 def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float, float] | None:
     """Invert `block` (k, k) on the rows that can change; return their positions, the inverse and `growth`.
 
-    Rows can always become active (sign -1); rows can become inactive (1) if no body becomes free.  Rounding grows with
-    the largest compliance of a row * `stiffness` (k,): `growth`.  None if a scaled pivot is at most `pivot`.
+    Rows can always become active (sign -1), and become inactive (1) if no body becomes free.  Rounding grows with
+    `growth`, the largest compliance of a row times `stiffness` (k,).  Returns None for scaled pivots up to `pivot`.
     """
     # The units of both kinds of rows differ by the square of a stiffness.
     units = np.where(sign > 0.0, stiffness, 1.0 / stiffness)

@@ -31,8 +31,8 @@ from feti_homog.typing import Float, Int
 class AssembledSchur:
     """The assembled Schur complement Z^T S Z of all subdomains; every rank has the whole factor.
 
-    S includes springs (`with_springs`).  Boundary displacements u = Z y have no jump on active rows, B Z = 0: all
-    copies of a node move together, but at inactive rows the copies of the inner body move independently.
+    S includes springs (`InterfaceOperators.with_springs`).  Boundary displacements u = Z y have no jump on active rows,
+    B Z = 0: all copies of a node move together, but at inactive rows the copies of the inner body move independently.
 
     Attributes:
         size: number of columns of Z, over all ranks.
@@ -94,7 +94,7 @@ class AssembledSchur:
 
 
 def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_matrix | Float:
-    """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs (`with_springs`).  Collective.
+    """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs, as in `AssembledSchur`.  Collective.
 
     The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
     `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.
@@ -204,9 +204,9 @@ class ReferenceCell:
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
     def _without_springs(self, x: Float) -> Float:
-        """Compute Gamma x without the springs at nodes of A where both bodies are cut.  Collective.
+        """Compute Gamma x without the springs C at nodes of A where both bodies are cut.  Collective.
 
-        With x = (g, f), u = B_D^T g + Z y such that Z^T (S u - B_I^T f) = 0; then B_A^T lam = S u - B_I^T f.
+        With x = (g, f): u = B_D^T g + Z y, Z^T (S u - B_I^T f) = 0, B_A^T lam = S u - B_I^T f, gap = -B_I u - C_I f.
         """
         operators, jump_operator = self._operators, self._jump_operator
         g, f = distributed_arrays.scale_rows(self.active, x), distributed_arrays.scale_rows(1.0 - self.active, x)
@@ -231,8 +231,8 @@ class ReferenceCell:
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
 
-    Only the moved body needs forces.  The inner body moves, unless its forces would lose digits because it is more than
-    STIFF_FIBRES times as stiff as the outer body.
+    Then columns of Gamma need only forces of the moved bodies.  The inner body moves, unless its forces would lose
+    digits because it is more than STIFF_FIBRES times as stiff as the outer body.
     """
     comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
@@ -270,7 +270,7 @@ class BondedInverse(Preconditioner):
     is_exact = True
 
     def __init__(self, operators: InterfaceOperators) -> None:
-        """Factor the cell; all boundary operators must be dense.  Collective."""
+        """Factor the cell with all bonds intact, from dense operators; raises like `ReferenceCell`.  Collective."""
         self._cell = ReferenceCell(operators, one_sided_jumps(operators), np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:

@@ -86,7 +86,7 @@ class ShiftedFactor:
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """Solve (K + D) u = f + D x for u (dofs, k): K u = f (dofs, k) if u = x (n, k) on `rows`."""
+        """Solve K u = f (dofs, k) for u (dofs, k), by (K + D) u = f + D x; x (n, k) are the values of u on `rows`."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)
@@ -99,7 +99,7 @@ class CondensedMatrix:
     """A matrix K and loads Q (dofs, v), condensed to n rows b; i are the other rows.
 
     Attributes:
-        S: (n, n) Schur complement, in Fortran order.
+        S: (n, n) Schur complement K_bb - K_bi K_ii^-1 K_ib, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
         factor: factor of K + D; None if it is not kept, or if MUMPS condensed K.
@@ -114,7 +114,7 @@ class CondensedMatrix:
 def condensed_with_loads(
     matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None, keep_factor: bool = False
 ) -> CondensedMatrix:
-    """Condense a matrix and `loads` Q (dofs, v) to `rows` (n,); see `schur_complement`.  CHOLMOD may `keep_factor`."""
+    """Condense matrix and loads Q (dofs, v) to `rows` like `schur_complement`; `keep_factor` keeps CHOLMOD's factor."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order, keep_factor)
     v, n = loads.shape[1], len(rows)

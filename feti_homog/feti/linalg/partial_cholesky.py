@@ -172,7 +172,7 @@ class PartialFactor:
         return self._solve(System.A, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
 
     def _solve(self, system: System, B: Float) -> Float:
-        """Solve A X = B or L X = B for B (n, k) in Fortran order, in CHOLMOD's order of rows.
+        """Solve A X = B or L X = B in CHOLMOD's order of rows; B (n, k) is in Fortran order.
 
         Raises:
             MemoryError: CHOLMOD cannot solve, usually for lack of memory.
@@ -198,7 +198,7 @@ def _array(pointer: int, size: int, kind: Any) -> Array:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Load the CHOLMOD library that petsc4py is linked with."""
+    """Load the CHOLMOD library that petsc4py is linked with, and turn off its warnings."""
     library = ctypes.CDLL(PETSc.__file__)
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)

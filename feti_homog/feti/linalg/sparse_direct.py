@@ -86,11 +86,7 @@ class DirectSolver:
     """A solver X = A^-1 B for one symmetric definite matrix A (n, n) on one rank."""
 
     def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
-        """Factor A = `matrix`, by default by CHOLMOD's Cholesky; see `factored`.
-
-        Raises:
-            LinAlgError, MemoryError, CaseError: as in `factored`.
-        """
+        """Factor A = `matrix`, by default by CHOLMOD's Cholesky; `is_ordered` and exceptions are as in `factored`."""
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
         self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD, is_ordered=is_ordered)
@@ -213,7 +209,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Return a PETSc matrix on this rank that shares the arrays of a sparse matrix; its indices are sorted first."""
+    """Share the arrays of `matrix` with a PETSc matrix on this rank; the indices are first sorted in place."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

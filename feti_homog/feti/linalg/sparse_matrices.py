@@ -32,7 +32,7 @@ def sum_of_blocks(
 
 
 def _with_buffered(total: csr_matrix, buffer: list[tuple[Int, Int, Int32, Float]]) -> csr_matrix:
-    """Add buffered blocks to `total`; a block has rows, entry counts of the rows, columns and values."""
+    """Return `total` plus buffered blocks; a block has rows, entry counts of the rows, columns and values."""
     rows, counts, columns, values = (np.concatenate(part) for part in zip(*buffer, strict=True))
     m, n = total.shape
     # A product adds faster than a conversion from coordinates, which sorts.
@@ -126,7 +126,7 @@ def _even_share(comm: MPI.Intracomm, n: int) -> int:
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """Sum local matrices into a distributed PETSc matrix; arguments as in `assemble_owned_rows`.  Collective."""
+    """Sum local matrices into a distributed PETSc matrix; arguments are as in `assemble_owned_rows`.  Collective."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)
@@ -183,7 +183,7 @@ class DistributedSolver:
             self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
             matrix.scale(self._scale)
             library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
-            # The vectors need all ranks; the factorization may fail on one rank alone.
+            # The vectors need all ranks; the factorization may fail on only one rank.
             self._x, self._b = matrix.createVecs()
             if near_kernel is not None:
                 # A basis (n, m), without zero columns and equal on all ranks.

@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node has one other sharer, in another body.
-        has_springs: whether the subdomain is an inner body with springs: its stiffness S~ (`with_springs`) is dense.
+        has_springs: whether the subdomain is an inner body with springs: its S~, see `with_springs.py`, is dense.
     """
 
     dofs: int
@@ -99,7 +99,7 @@ class DualOperator:
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam (boundary dofs, k) for lam (owned rows, k), which Eq. (34) subtracts.  Collective."""
+        """Compute K+ B^T lam (boundary dofs, k), subtracted in Eq. (34), for lam (owned rows, k).  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
@@ -115,8 +115,7 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) first boundary dof of every subdomain, and n.
         local_dofs: (n,) numbers of the boundary dofs among all dofs of this rank.
         operators: for every subdomain, S and S+ as dense matrices or by sparse factors.
-        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioner and coarse
-            space.
+        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioners.
         facewise: for every subdomain, whether soft modes are computed face by face.
         B, BT: (local rows, n) constraints, and their transpose.
         body_diagonal: (n,) diagonal of K.
@@ -141,8 +140,8 @@ class InterfaceOperators:
         """Factor every local subdomain as `choose` decides, without communication.
 
         `kind`, `applications` and `soft_modes` are as in `choose`.  `compliance` (local rows,) of the springs is None
-        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps on one
-        rank alone, if rounding leaves the stiffness of a subdomain without a factor.
+        if no rank has springs.  `keep_factors` is as in `ExplicitInterfaceOperator`.  Raises MeshError, perhaps only on
+        one rank, if rounding leaves the stiffness of a subdomain without a factor.
         """
         self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
         self._loads = max([len(jump_operator.problem.loads), *(s.Q.shape[1] for s in subdomains)])
@@ -195,7 +194,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in inner bodies: at each node, in every body but the outermost."""
+        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, only in the inner body."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -210,7 +209,7 @@ class InterfaceOperators:
         return self._each([o.apply_schur for o in self.operators], x)
 
     def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
-        """Compute S~ x, with the stiffness S~ of bodies with springs, for x (n,) or (n, k).
+        """Compute S~ x for x (n,) or (n, k), with the stiffness S~ of bodies with springs.
 
         `which` (subdomains,) selects subdomains; the result is 0 on all other subdomains.
         """
@@ -233,7 +232,7 @@ class InterfaceOperators:
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C (v, v) and energies."""
+        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C and of energies, (v, v)."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])

@@ -39,7 +39,7 @@ class ExplicitInterfaceOperator:
         Options have the prefix `feti_schur_`.  `keep_factor` keeps CHOLMOD's factor if loads act inside.
 
         Raises:
-            LinAlgError, MemoryError: as in `schur_complement`, or S is not positive definite off its kernel.
+            LinAlgError, MemoryError, FetiHomogError: as in `schur_complement`; LinAlgError if S is indefinite, too.
         """
         from feti_homog.feti.linalg import dense_matrices  # sparse operators do not need it
 
@@ -86,9 +86,9 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by a symmetric matrix, `diagonal` (n,) and a triangle (`lower` 0 or 1), into `out` if given.
+        """Multiply x by the symmetric matrix of a `diagonal` (n,) and the upper (`lower` 0) or lower (1) triangle.
 
-        A product is fastest for x in Fortran order.
+        The product goes into `out` if given, and is fastest for x in Fortran order.
         """
         A = self._both
         if out is None:
@@ -162,7 +162,7 @@ class ImplicitInterfaceOperator:
     is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
-        """Factor K + rho Rf Rf^T (`fixing`), or K_ii if pinned and without boundary; `dofs` (n,) are ascending.
+        """Factor K + rho Rf Rf^T (`Subdomain.fixing`), or K_ii of held subdomains without boundary; `dofs` (n,) ascend.
 
         Options have the prefix `feti_sub_`, or `feti_interior_` for K_ii.  Raises like `DirectSolver`.
         """

@@ -174,7 +174,7 @@ class SpringUpdated(Preconditioner):
     """A preconditioner H with `SpringUpdate` for the springs of active rows, which may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
-        """Update H = `inner` with all rows active; arguments and exceptions as in `SpringUpdate`.  Collective."""
+        """Update H = `inner` with all rows active; arguments and exceptions are as in `SpringUpdate`.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._intact_compliance = self._compliance = compliance
         self.is_exact, self.norm = inner.is_exact, inner.norm  # springs only reduce |H|

@@ -61,7 +61,7 @@ class _Softening:
     """
 
     def __init__(self, T: csr_matrix, ST: Float, kernel: Float) -> None:
-        """Factor I + T^T A T for `T` (n, r) with orthogonal columns, `ST` = S T, and a `kernel` (n, k) of S."""
+        """Factor I + T^T A T; `T` (n, r) has orthogonal columns, `ST` is S T, and `kernel` (n, k) the kernel of S."""
         self.kernel, squares = np.linalg.qr(kernel)[0], np.asarray(T.power(2).sum(axis=0)).ravel()
         # T divided by its squared column norms: T^T times these directions is I.
         self._directions = (T @ diags(1.0 / squares)).tocsr()
@@ -101,7 +101,7 @@ class WithSprings:
     """
 
     def __init__(self, body: BoundaryOperator, T: csr_matrix, kernel: Float) -> None:
-        """Prepare S~, dense if `body` is, from the root `T` (n, r) of C = T T^T and the `kernel` (n, k) of S."""
+        """Prepare S~, dense if `body` is; `T` (n, r) is the root of C = T T^T, and `kernel` (n, k) the kernel of S."""
         self._body, self._T = body, T
         self.is_dense = body.is_dense
         if is_dense(body):

@@ -30,7 +30,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.loads import NEGLIGIBLE, Load, LoadScales, solve_load, unresisted
 from feti_homog.typing import Bool, Float, Int
 
-# Number of block pivots, from the last one with progress; the literature usually allows ten without progress.
+# Number of block pivots, counted from the last one with progress; the literature usually allows ten without progress.
 BLOCK_PIVOTS = 11
 # Number of dual problems after which the search gives up; the certificate then shows the errors.
 MAX_CONTACT_SOLVES = 500
@@ -38,7 +38,9 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """The contact problem of all interfaces, with k nodes on this rank.  Methods that solve set the state of `solver`.
+    """The contact problem of all interfaces, with k nodes on this rank.
+
+    Methods that solve set the state of `solver`, and also raise like `FetiSolver.set_state` and `solve_many`.
 
     Attributes:
         solver: dual solver.
@@ -63,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        At debonded nodes only normal forces of closed nodes are active, with contact; all other multipliers are active.
+        All are active except at debonded nodes; there, with `contact`, only the normal multipliers of closed nodes are.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -76,7 +78,7 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) in the bond states."""
+        """Return the spring compliance C (owned rows,) in a bond state; without damage, `intact_compliance` itself."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -108,17 +110,17 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) after bonds `which` (k,) part: closed under pressure `lam` with contact, else open."""
+        """Part bonds `which` (k,); return status (k,): with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """Return the normal and tangential traction (k, 2), tension positive, or axial traction (k, 1)."""
+        """Return tractions, tension positive: normal and tangential (k, 2), or axial (k, 1) in the axial problem."""
         return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:
-        """Return gap and slip (k, 2), matrix minus fibre, or slip along the fibre (k, 1)."""
+        """Return gap and slip (k, 2), matrix minus fibre; in the axial problem the slip along the fibre (k, 1)."""
         return np.asarray(solution.opening[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
@@ -144,7 +146,10 @@ class ContactProblem:
         return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return the state with amplitudes and jumps by the dual operator; unchanged if it has them.  Collective."""
+        """Return the state with amplitudes alpha and jumps by the dual operator.  Collective.
+
+        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha stays unchanged.
+        """
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
@@ -164,7 +169,10 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Find statuses and solution under a load, from guessed bonds.  Collective; raises like `linear`."""
+        """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
+
+        Tries a load that open faces do not carry with closed faces.  Raises like `linear` and `FloatingBodies.place`.
+        """
         try:
             return self._search(load, bonds, start)
         except NotCarriedError:
@@ -175,7 +183,7 @@ class ContactProblem:
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `linear`.
+        """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `equilibrium`.
 
         The search gives up after MAX_CONTACT_SOLVES dual problems, or after a solve without convergence.
         """
@@ -215,7 +223,7 @@ class ContactProblem:
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective.
 
-        Return the solution with the new positions, and the mask (k,).
+        Return the solution with new alpha and jumps, and the mask (k,).  Raises like `FloatingBodies.place`.
         """
         coarse = self.solver.natural
         if not (self.contact and coarse.unconstrained_modes.shape[1]):
@@ -249,8 +257,8 @@ class ContactProblem:
     ) -> Equilibrium:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
-        Bonds and faces under compression resist motions.  Closed nodes without a force hold no fibre, and become open
-        if a fibre is free without these nodes.  The fibre then moves, if there is room, so that its faces part least.
+        Bonds and pressed faces resist motions.  Closed nodes without a force hold no fibre, and become open if a fibre
+        is free without these nodes.  If there is room, this fibre then takes the position with least squared jumps.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

@@ -44,12 +44,12 @@ class CoupledInterfaces:
         return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
-        """Solve the dual problems at fixed statuses, from multipliers `start`.  Collective; raises NotCarriedError."""
+        """Solve each dual problem from its multipliers in `start`, like `ContactProblem.linear`.  Collective."""
         triples = zip(self.problems, self.parts(load), start, strict=True)
         return tuple(problem.linear(part, bonds, lam) for problem, part, lam in triples)
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """Find the equilibrium under a load, from guessed bonds.  Collective; raises like `linear`."""
+        """Find the equilibrium under a load, like `ContactProblem.equilibrium`.  Collective."""
         loads = self.parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start[0])
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
@@ -93,10 +93,7 @@ class CoupledInterfaces:
 
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
-    """Return r = s - C lam (owned rows,) in the tangential rows of damaged bonds.
-
-    The result is 0 in other rows, and without friction.
-    """
+    """Return r = s - C lam (owned rows,) in tangential rows of damaged bonds; 0 elsewhere and without friction."""
     r = np.zeros(interface.solver.rows)
     if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
         rows = interface.nodes.row[state.status == BONDED] + 1
@@ -116,10 +113,7 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """Return the traction (k, c) in the intact fraction of bonds on this rank.
-
-    The shear in the intact fraction of a damaged bond is s / C.
-    """
+    """Return the traction (k, c) in the intact fraction of bonds; a damaged bond has the shear force s / C there."""
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

@@ -92,7 +92,7 @@ class _Fibres:
         return amplitudes, squeezes
 
     def shares(self, before: Float, after: Float, noise: float) -> tuple[float, float]:
-        """Return both fractions of a step between gaps (k,), as `FloatingBodies.admissible_share` defines them."""
+        """Return the fractions of `FloatingBodies.admissible_share` for gaps (k,); raises like `_maximised`."""
         shares = [(1.0, 1.0)]
         for node, motion, *_ in self.nodes_and_motions(after < -2 * noise):
             a, b = before[node], after[node]
@@ -165,9 +165,10 @@ class FloatingBodies:
 
 
 def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[float, float]:
-    """Return the fractions of a step at which the first value (k,) reaches 0 and -2 noise.
+    """Return the fractions of a step at which the first of k values reaches 0 and -2 noise.
 
-    Both are 1 if all values end at or above -2 noise, for they may be the solver's error; `noise` may be (k,).
+    The values go from `before` (k,) to `after` (k,); `noise` may be (k,).  Both fractions are 1 if all values end at or
+    above -2 noise, for such values may be the solver's error.
     """
     falls = after < -2 * noise
     a, b, doubt = before[falls], after[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
@@ -176,16 +177,16 @@ def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[f
 
 
 def _last_share(before: Float, after: Float, motion: Float, slack: float) -> float:
-    """Return the largest w in [0, 1] with (1 - w) before + w after + motion a >= -slack for some amplitudes a."""
+    """Maximize w in [0, 1] with (1 - w) before + w after + motion a >= -slack over w and amplitudes a; return w."""
     scale, size = np.abs([before, after]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (before - after) / scale, (before + slack) / scale, (0.0, 1.0))
     return float(result.x[-1])
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
-    """Maximize w within `bounds`, subject to motions a + last w <= limits, |a| <= LARGEST_MOTION; return x = (a, w).
+    """Maximize w within `bounds`, subject to motions a + last w <= limits and |a| <= LARGEST_MOTION.
 
-    Raises ConvergenceError if HiGHS finds no solution.
+    Return SciPy's result, where x = (a, w).  Raises ConvergenceError if HiGHS finds no solution.
     """
     from scipy.optimize import linprog  # slow to import, and few cells have free fibres
 

@@ -41,7 +41,7 @@ class BondState:
         pressed: (k,) bonds under compression, with the normal stiffness of undamaged bonds.
         gap_and_slip: (k, 2) with friction, jumps of debonded faces and the jumps that damage adds to bonds, 0 at intact
             bonds; None without friction.
-        sliding: (k,) sign with which the slip of a closed node grows, 0 if it sticks; None without friction.
+        sliding: (k,) sign with which the slip grows, 0 at nodes that do not slide; None without friction.
     """
 
     status: Status
@@ -80,7 +80,7 @@ class Equilibrium:
     Attributes:
         load: prescribed load.
         bonds: states of this rank's interface nodes.
-        solution: last dual solution.
+        solution: dual solution of the last solve.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists.
         certificate: errors by `kkt_errors`; with friction also `kkt_friction`.

@@ -28,7 +28,7 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Largest number of pivots, besides one for each status of each node, before other searches, and of a continuation step.
+# Number of pivots, beyond four for each node, after which other searches begin; also the most in a continuation step.
 SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
@@ -54,7 +54,7 @@ class StatusSearch:
         allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; the search
             ignores the conditions for a change to any other status.
         faces, load: the faces, and the prescribed loads and slips.
-        start: (m,) scaled x before the load, where free motions keep their amplitude.
+        start: (m,) scaled x before the load, from which free motions keep their amplitudes.
     """
 
     faces: FaceSystem
@@ -99,7 +99,7 @@ class StatusSearch:
         return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield other admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
+        """Yield admissible statuses and x: from guesses that all sliding faces, or one, stick; then by trial."""
         sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
         for stuck in (sliding, *sliding):
             guess = status.copy()
@@ -109,11 +109,11 @@ class StatusSearch:
         yield from self._tried(status)
 
     def by_trial(self, status: Status) -> Found:
-        """Return the admissible statuses closest to the guess, and x; None also with too many candidates."""
+        """Return the admissible statuses with the fewest changes of the guess, and x; None also with too many sets."""
         return next(self._tried(status), None)
 
     def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
-        """Yield all admissible statuses and x, the closest to the guess first; nothing with too many candidates."""
+        """Yield all admissible statuses and x, fewest changes of the guess first; nothing with too many sets to try."""
         choosers = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[choosers].sum(axis=1).astype(float).prod() > MOST_TRIED:
             return
@@ -197,12 +197,12 @@ class CoulombFaces(FaceSystem):
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find the statuses (n,) and x (m,) at the end of an implicit step to a load; arguments as in `search`.
 
-        Raises as `search` does, and StuckError if all results have negative determinants.
+        Raises as `search` does, and StuckError if det M is negative, and positive for no other admissible statuses.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 
     def carries(self, status: Status, load: Prescribed, start: Float) -> bool:
-        """Return whether `step` would find admissible statuses, of any determinant; a few pivots decide most cases."""
+        """Return whether `step` would find admissible statuses, with any det M; a few pivots decide most cases."""
         search = StatusSearch(self, self.all_allowed(), load, start)
         result = search.by_pivots(self._known(status), SOLVES)
         if result is not None or search.slides_freely(self._known(status)):
@@ -210,11 +210,10 @@ class CoulombFaces(FaceSystem):
         return search.run(self._known(status)) is not None
 
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Find admissible statuses without a negative determinant, and x; arguments as in `search`.
+        """Find admissible statuses for which det M is not negative, and x; arguments as in `search`.
 
-        A fibre that a few faces pinch jams if all of these faces stick, and snaps through with a negative stiffness if
-        one of these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as
-        `step` does.
+        A pinched fibre jams if all faces that pinch it stick, and snaps through, with a negative stiffness, if one of
+        these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as `step` does.
         """
         status, x = self.search(status, allowed, load, start)
         if self.sign(status, load.by_stress) >= 0:
@@ -251,12 +250,12 @@ class CoulombFaces(FaceSystem):
         return float((np.maximum(margins[ends], 0.0) / -falls[ends]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
-        """Return the frictional heat on the straight path between two states x with equal statuses."""
+        """Return the heat of a straight path at fixed statuses: mean friction forces times slips, at sliding nodes."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
         return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the lost energy and its heat on the straight path between states x at constant load."""
+        """Return the energy lost on the straight path between states x at constant load, and the heat in this loss."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

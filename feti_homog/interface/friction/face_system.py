@@ -43,13 +43,13 @@ class FaceSystem:
 
     Attributes:
         friction: (n,) mu.
-        S: (m, m) scaled stiffness, with 1 as the largest diagonal entry of each node.
-        size: (m,) units: the stiffness is S_ij size_i size_j.
-        nodes, loads: the number n of nodes, and the indices of the loads in x.
+        S: (m, m) scaled stiffness of x = (g, E), with 1 as the largest diagonal entry of each node.
+        size: (m,) units, m = 2n + v: the stiffness is S_ij size_i size_j.
+        nodes, loads: the number n of nodes, and the indices of the v loads E in x.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """Scale the stiffness (m, m) of n normal and n tangential jumps and v loads: m = 2n + v."""
+        """Scale the stiffness (m, m) of n pairs of jumps (normal, tangential), then v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction, self.nodes, self.loads = friction, n, slice(2 * n, len(stiffness))
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
@@ -68,7 +68,7 @@ class FaceSystem:
         return f[::2], f[1::2]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the factored response of `before` if it can grow; see `FollowedStatuses.grow`."""
+        """Take over the factored response of `before`, changed in place by `FollowedStatuses.grow`, if it can grow."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -106,7 +106,7 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant with given statuses, 0 with free motions."""
+        """Return the sign of det M, see `status_system`, with given statuses; 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
@@ -144,7 +144,7 @@ class FaceSystem:
         return status_system.largest_share(unbalanced, sizes, slope) <= UNBALANCED
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with `start` in free entries, and the right-hand side (m,) in the load rows."""
+        """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])

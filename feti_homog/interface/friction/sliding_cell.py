@@ -83,7 +83,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Return the multipliers in owned rows (k, c).  Columns of these rows stay stored for the next call."""
+        """Return `multipliers` in owned rows (k, c); store the columns of these rows for a call with the same array."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
@@ -109,8 +109,8 @@ class CondensedProblem:
 class AxialFaces:
     """The axial part of the matrix S of `coulomb_faces`, with eliminated jumps g = K^-1 b E.
 
-    K is H_DD with springs.  A weak spring holds each row: HELD times the row's own diagonal entry of K, as other
-    entries may be far larger.
+    K is H_DD with springs.  A weak spring holds each row.  The spring's stiffness is HELD times the diagonal entry of K
+    in the same row, because entries in other rows may be far larger.
 
     Attributes:
         problem: condensed axial problem.
@@ -189,7 +189,7 @@ class SlidingCell:
             self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
-        """Condense the cell to `bonds`, and return their statuses (n,) and x (m,) at a strain (v,).  Collective.
+        """Condense the cell to `bonds`, and return face statuses (n,) and x (m,) at a strain (v,).  Collective.
 
         Without stored jumps all gaps and slips are zero.
         """
@@ -203,7 +203,7 @@ class SlidingCell:
         return status, np.concatenate([table[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
-        """Return this rank's bonds with the statuses (n,) and the jumps in x."""
+        """Return this rank's bonds with face statuses (n,) and the jumps in x; damaged bonds stay BONDED."""
         face, jump = status[self._position], np.zeros((len(before.status), 2))
         jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
@@ -260,7 +260,7 @@ class SlidingCell:
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
         """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        All `loads` scale the certificate; its `kkt_friction` is the largest of `coulomb_errors` over the largest
+        All `loads` scale the certificate; `kkt_friction` is the largest of `coulomb_errors` relative to the largest
         traction.
         """
         states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))

@@ -196,7 +196,7 @@ class FollowedStatuses:
         return True
 
     def _row(self, kind: int, at: int) -> Float:
-        """Return the row (m,) at position `at` of M^-1, for `kind` 0, or of S M^-1, for 1."""
+        """Return the row (m,) at position `at` of M^-1 if `kind` is 0, of S M^-1 if `kind` is 1."""
         count, size = self._count, self._size
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
 

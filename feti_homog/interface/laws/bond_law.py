@@ -30,7 +30,7 @@ Sections = Sequence[interface_section.InterfaceSection]
 
 @dataclasses.dataclass(frozen=True)
 class SectionValues:
-    """The values of [interface] keys at nodes (k,), which belong to the sections with indices `pair` (k,).
+    """The values of [interface] keys at nodes (k,) in the sections `bonds`, with section indices `pair` (k,).
 
     The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
     """
@@ -200,10 +200,7 @@ class SpringLaw(BondLaw):
         return np.asarray(opening), np.asarray(slip)
 
     def mode_angle(self, traction: Float) -> Float:
-        """Return the mode angle psi (p,) of tractions (p, c), in radians.
-
-        sin^2 psi is the fraction of the spring energy in slip.
-        """
+        """Return the mode angle psi (p,) in radians of tractions (p, c): slip has sin^2 psi of the spring energy."""
         opening, slip = self.energies(traction)
         return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
 

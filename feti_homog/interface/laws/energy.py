@@ -191,7 +191,7 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return the mask (p,) of nodes with convex `share`: no tips, where energies need not be subadditive."""
+        """Return the mask (p,) of nodes with convex `share`: all but tips, where energies need not be subadditive."""
         return np.asarray(self.number < 0)
 
 

@@ -182,7 +182,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _damages(self) -> Float:
-        """The damage levels (n + 1,)."""
+        """The damage levels (n + 1,) at the ends of n teeth."""
         return np.array(self.levels)
 
     @property
@@ -241,7 +241,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u): on the linear piece with a sign change."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the piece where the sides change order."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -260,7 +260,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law by a table of tractions over openings in mode I.  Stretching adapts it to the toughness in other modes."""
+    """A law by a table of tractions over openings in mode I; in other modes s stretches the table to G_c."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:

@@ -55,14 +55,14 @@ class CoulombLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """The equilibrium at s, computed once.  Collective."""
+        """The equilibrium at leg fraction s, computed once.  Collective."""
         if self._state is None:
             loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
             self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
         return self._state
 
     def _path_state(self) -> PathState:
-        """Return the path state at s, with the spring energy of damaged bonds.  Collective."""
+        """Return the path state at leg fraction s, with the spring energy of damaged bonds.  Collective."""
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the next leg fraction, and the error that limits it; (`share`, None) also if no statuses fit."""
+            """Return the carried leg fraction, and the error beyond it; (`share`, None) also if the step is stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

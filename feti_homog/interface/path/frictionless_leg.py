@@ -24,7 +24,7 @@ OFF_LINE_ROUNDING = 1e-10
 class FrictionlessLeg(Leg):
     """A leg with equilibria that are independent of the path.
 
-    From the equilibrium at s the transitions are
+    From the equilibrium at leg fraction s, the transitions are
 
         overloaded   A break, or a contact change at which the released energy of tips jumps, overloads bonds: the
                      worst bonds break (a point); solve at the same s without these bonds.
@@ -51,7 +51,7 @@ class FrictionlessLeg(Leg):
 
     @property
     def state(self) -> Equilibrium:
-        """The equilibrium at s; not collective."""
+        """The equilibrium at leg fraction s; not collective."""
         return self._state
 
     def points(self) -> Iterator[Point]:

@@ -21,9 +21,9 @@ SAME_SHARE = 1e-9
 class Leg(ABC):
     """Leg number `leg` of a path, at a fraction s that rises from 0 to 1.
 
-    The loads `start` at s = 0 and `end` at s = 1 prescribe the same components as strains and as stresses.  Bonds break
-    at constant load: the state before a break is a point, and the path continues from the state after the break at the
-    same s. Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
+    The loads `start` at s = 0 and `end` at s = 1 prescribe stresses in the same components.  Bonds break at constant
+    load: the state before a break is a point, and the path continues from the state after the break at the same s.
+    Methods that solve raise NotCarriedError if the cell does not carry the stresses of the load.
 
     Attributes:
         limit: error that stopped the last step short of its load, or None.
@@ -117,14 +117,11 @@ class Leg(ABC):
             is_due = False
 
     def _release(self, which: Bool) -> tuple[int, int, path_points.PathState]:
-        """Break the bonds `which` (k,).  Collective.
-
-        Return the numbers of bonds that part and of bonds that soften, and the path state after the break.
-        """
+        """Break the bonds in the mask `which` (k,), and return the result of `break_bonds`.  Collective."""
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, where bonds part and soften.  Collective; the sum of energies starts anew."""
+        """Return the point at s, for numbers of bonds that part and soften; the energy sum starts anew.  Collective."""
         energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)

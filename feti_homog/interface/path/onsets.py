@@ -96,7 +96,7 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before:
 
 
 def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
-    """Return the fractions of a step where contact begins to change, and surely has changed.
+    """Return the fractions of the step to `end` where contact begins to change, and surely has changed.
 
     Both are 1 without a change.  Tension or overlap of twice the solver's error is certain.  A closed node opens when
     its force vanishes; open nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the

@@ -77,7 +77,7 @@ def increments(
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
-    """Yield the points from zero to the load, through all equilibria.  Collective; raises like `events`.
+    """Yield the points of the first leg, also where the load falls.  Collective; raises like `events`.
 
     With fixed bonds, the state under t times the load is t times the state, for t >= 0.
     """

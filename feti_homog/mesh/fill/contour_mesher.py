@@ -6,7 +6,7 @@ The cell sides run through pixel centres. Contours cross opposite sides at equal
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
@@ -27,7 +27,8 @@ from feti_homog.typing import Bool, Float, Int32
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
     """Mesh the regions of an image with phase numbers (rows, columns) within smooth outlines.
 
-    A Gaussian filter, one pixel wide, smooths the mask `_every_other`; splines follow the contour of equal area.
+    A Gaussian filter, with a standard deviation of one pixel, smooths the mask from `_every_other`; splines follow the
+    contour that encloses the area of the mask.
 
     Raises:
         CaseError: scikit-image is not installed.
@@ -39,7 +40,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         raise CaseError('[cell] smooth = true: needs scikit-image: pip install "feti_homog[images]"') from None
     mask = _every_other(phase, phases)
     indicator = gaussian_filter(mask.astype(float), 1.0, mode="wrap")
-    level = float(np.quantile(indicator, 1.0 - mask.mean(), method="midpoint"))
+    # Pixels have few distinct values, so that more of them exceed a level than the area within its contour has.
+    quarters = zoom(indicator, 2, order=1, mode="grid-wrap", grid_mode=True)
+    level = float(np.quantile(quarters, 1.0 - mask.mean(), method="midpoint"))
     # The cell sides run where they cross contours most steeply.
     away = np.abs(indicator - level)
     across = [(away + np.abs(np.roll(indicator, -1, axis) - indicator)).min(axis=axis) for axis in (0, 1)]
@@ -68,18 +71,21 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
             lines.append((1, occ.addSpline(tags)))
         occ.fragment([(2, occ.addRectangle(0.0, 0.0, 0.0, *size.tolist()))], lines)
         occ.synchronize()
-        try:
-            content = filled(gmsh, size, field)
-        except Exception as error:  # gmsh raises only Exception
-            advice = "expected larger regions of a phase: filter the image, or smooth = false"
-            raise MeshError(f"[cell] smooth = true: gmsh cannot fill the outlines ({error}); {advice}") from None
+        advice = "larger regions of a phase: filter the image, or smooth = false"
+        content = filled(gmsh, size, field, "smooth = true", advice)
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
     place = i + 0.5 - width * (2 * i > width), j + 0.5 - rows * (2 * j > rows)
-    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]))
+    counts = zip(phases, np.bincount(phase.ravel()).tolist(), strict=True)
+    shares = ", ".join(f"{name} {count / phase.size:.6g}" for name, count in counts)
+    remark = f"[cell] smooth = true: fractions in the image: {shares}"
+    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]), remarks=(remark,))
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Mark pixels (rows, columns) of the phases 1, 3, ... contacts from the matrix; MeshError if three phases touch."""
+    """Return the mask (rows, columns) of the phases that are 1, 3, ... contacts away from the matrix.
+
+    Raises MeshError if three phases touch: then two neighbours are both in the mask, or both outside.
+    """
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
     a, b = a[a != b], b[a != b]
@@ -92,10 +98,11 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
-    """Return the field of edge sizes, in cell widths, for `curves` of points (k, 2), in pixels.
+    """Return the field of edge sizes in cell widths for `curves` of points (k, 2) in pixels.
 
-    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number. Edges
-    are shorter in narrow passages, between points with opposite gradients of the `indicator`.
+    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number, unless
+    the edges would be shorter than a pixel. Edges are shorter in narrow passages, between points with opposite
+    gradients of the `indicator`; `largest` is the upper limit.
     """
     unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
     points = np.concatenate([np.zeros((1, 2)), *curves])

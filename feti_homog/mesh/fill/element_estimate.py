@@ -19,7 +19,7 @@ from feti_homog.typing import Float
 MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 # Area of an equilateral triangle / its side squared.
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0
-# Additional triangles around a fibre of a random cell, because of narrow gaps.
+# Additional triangles around a fibre of a random cell or a table, because of narrow gaps.
 TRIANGLES_OF_A_FIBRE = 160
 # Ratios of element sizes; the largest exceeds every ratio in a case.
 RATIOS = np.geomspace(1.0, 1e7, 400)
@@ -71,8 +71,9 @@ class ElementEstimate:
     def triangles(self) -> float:
         """The estimated triangle count in a cell without debonded arcs.
 
-        Triangles of one size fill the cell. More lie around fibres, at the ends of ellipses, and on both sides of
-        interfaces of length P, size h, growth g and A = TRIANGLE_AREA: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h).
+        Triangles of one size fill the cell. Further triangles lie around fibres, at the ends of ellipses and, with
+        `interface_size` h, on both sides of interfaces of length P: 2 P int dx / (A (h + g x)^2) = 2 P / (A g h), with
+        the growth g = MAX_GROWTH and A = TRIANGLE_AREA.
         """
         cell = self.cell
         irregular = 0 if cell.geometry in cell_section.LATTICES else self.fibres
@@ -116,6 +117,6 @@ def triangles_of_a_tip(ratio: np.float64 | float) -> float:
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Invert `triangles_of_a_tip`: return the size ratio for `count` triangles, from 1 to RATIOS[-1]."""
+    """Invert `triangles_of_a_tip`: return the size ratio for `count` triangles, limited to 1 ... RATIOS[-1]."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

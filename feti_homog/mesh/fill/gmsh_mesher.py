@@ -34,12 +34,13 @@ def begin(
 
     Args:
         listed: the arrangement of a table; None for other cells, which may be large.
-        marks: directions of debond tips, where the mesh gets nodes. A mark moves onto another mark, or onto a
-            crossing of the circle with the cell boundary, within `outline.MERGED` radians.
+        marks: directions of debond tips, where the mesh gets nodes. A mark moves onto another mark, or onto a crossing
+            of the circle with the cell boundary, within `outline.MERGED` radians.
         policy: rules for the division into tiles.
 
     Raises:
         MeshError: the fibres cannot be arranged or are too small, or the mesh would have too many elements.
+        Exception: gmsh cannot mesh a table with polygons.
     """
     sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = element_estimate.ElementEstimate.of(cell, listed)
@@ -103,11 +104,7 @@ class UnmeshedCell:
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations) -> NodedCell:
-        """Put nodes on all lines of the cell, and cut the cell into tiles.
-
-        Raises:
-            MeshError: the lines would have too many nodes.
-        """
+        """Put nodes on all lines of the cell, and cut the cell into tiles.  Raises MeshError for too many nodes."""
         lines = self.bare.outline(stations)
         arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
         classes = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)

@@ -14,14 +14,14 @@ from feti_homog.typing import Bool
 def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> CoarseMesh:
     """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
-    Raises:
-        CaseError, MeshError: as in `msh_reader.read`, `label_image.read_labels` and `contour_mesher.mesh_contours`;
-            also for pixels that voids cut off, and for voids at sides with tractions.
+    Messages propose the phases in `materials`.  Raises CaseError and MeshError as `msh_reader.read`,
+    `label_image.read_labels` and `contour_mesher.mesh_contours` do, also for pixels that voids cut off, and for voids
+    at sides with tractions.
     """
     assert cell.file is not None
     if cell.geometry == "mesh":
         snap = cell.snap_tolerance if cell.repair == "snap" else None
-        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials)
+        return msh_reader.read(cell.file, snap, cell.phases, bool(cell.voids), cell.boundary, materials, cell.order)
     phase, phases = label_image.read_labels(cell.file, cell.labels, cell.window == "mirrored")
     if cell.smooth:
         from feti_homog.mesh.fill import contour_mesher  # imports gmsh
@@ -54,15 +54,13 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List pixels that voids cut off from others, and voids at sides with tractions; `is_solid` is (rows, columns)."""
+    """List faults: pixels that voids cut off, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
     for k in np.flatnonzero(part != sizes.argmax())[:1]:
-        row, column = rows - solid[k] // columns, solid[k] % columns + 1
-        where = f"the part of {sizes[part[k]]} pixels around row {row}, column {column}"
-        faults.append(
-            f"floating parts, separated from all others by voids: {where}; expected the label of a void there"
-        )
+        where = f"{sizes[part[k]]} pixels around row {rows - solid[k] // columns}, column {solid[k] % columns + 1}"
+        line = "floating parts, separated from all others by voids: the part of"
+        faults.append(f"{line} {where}; expected the label of a void there")
     if mesh.boundary == "traction" and not (is_solid[[0, -1]].all() and is_solid[:, [0, -1]].all()):
         faults.append('voids at the sides, where boundary = "traction" has no material to pull at')
     return faults

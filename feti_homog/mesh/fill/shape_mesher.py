@@ -12,6 +12,7 @@ from types import ModuleType
 import numpy as np
 from scipy.spatial import cKDTree
 
+from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.element_estimate import refuse_many
 from feti_homog.mesh.outline.graded_size import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes, SizeField, wrap
@@ -29,23 +30,17 @@ SAME_PLACE = 1e-6
 FEWEST_CELLS, MOST_CELLS = 32, 1000
 # Edge length on a coating / thickness; cosine between outline and side normals, above which they face each other.
 COATING_EDGE, FACING = 2.0, 0.9
-# Number of sources that contribute to the size at a position.
-NEAREST = 12
 # Smallest edge size / size of the cell.
 LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh a cell of fibres with any convex outlines; see `gmsh_mesher.begin`.
-
-    Raises:
-        MeshError: the mesh would have too many elements.
-    """
+    """Mesh convex outlines; arguments as in `UnmeshedCell`.  raises like `refuse_many` and `filled`."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
-        raw = raw_mesh(filled(gmsh, arrangement.size, field))
+        raw = raw_mesh(filled(gmsh, arrangement.size, field, "fibres", "larger gaps or another mesh_size"))
         precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
     return replace(
         made(raw, "table").scaled(scale),
@@ -55,8 +50,8 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
     )
 
 
-def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
-    """Fill the surfaces of a cell with periodic second-order triangles, sized by `field`; raises gmsh's Exception."""
+def filled(gmsh: ModuleType, size: Float, field: SizeField, key: str, advice: str) -> MshContent:
+    """Fill the surfaces with periodic second-order triangles, sized by `field`.  If gmsh fails, raises MeshError."""
     # Curves on the right and upper sides copy the nodes of the left and lower sides.
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -83,7 +78,10 @@ def filled(gmsh: ModuleType, size: Float, field: SizeField) -> MshContent:
                 part.tofile(stream)
         gmsh.model.mesh.field.setString(structured, "FileName", str(path))
         gmsh.model.mesh.field.setAsBackgroundMesh(structured)
-        gmsh.model.mesh.generate(2)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:  # gmsh raises only Exception
+            raise MeshError(f"[cell] {key}: gmsh cannot fill the outlines ({error}); expected {advice}") from None
         gmsh.model.mesh.setOrder(2)
         return MshContent.of(gmsh)
 
@@ -112,7 +110,7 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
-    """Add the surface of an ellipse, or of a polygon with a margin; return the tag."""
+    """Add the surface of an ellipse, or of a polygon with the margin, if any; return the tag."""
     occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)
@@ -146,9 +144,9 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
 
-    h_k is at most the interface size, 1 / MIN_EDGES_AROUND of the circle of curvature at corners and on ellipses,
-    COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or to a cell
-    side that the outline faces; it is at least LEAST cell sizes.
+    h_k is at most the interface size, 2 pi R / MIN_EDGES_AROUND with the radius of curvature R at rounded corners and
+    on ellipses, COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or
+    to a cell side that the outline faces; h_k is at least LEAST times the longer side.
     """
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)
@@ -172,4 +170,4 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
         length = np.where(faces, np.minimum(length, PASSAGE_EDGE * to_side), length)
     length = np.maximum(length, LEAST * size.max())
     growth = np.full(len(places), MAX_GROWTH)
-    return SizeField([(places, length, growth)], size, sizes.largest, nearest=NEAREST)
+    return SizeField([(places, length, growth)], size, sizes.largest)

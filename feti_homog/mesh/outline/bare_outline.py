@@ -90,7 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, and matching nodes on sides.  Raises MeshError."""
+        """Make the outline from nodes on arcs and bridges and matching nodes on sides; MeshError for too many nodes."""
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
         parts = [*self._sides(0), *self._sides(1)]
@@ -111,7 +111,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield nodes (n, 2) and curves of both sides along `axis`, with matching nodes.  Raises MeshError."""
+        """Yield matching nodes (n, 2) and curves of both sides along `axis`; MeshError for too many nodes."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)
@@ -140,7 +140,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Divide curves into arcs; also return start points (a, 2), and a mask (a,) of points off `border` (b, 2)."""
+    """Return arcs as `outline.arcs_within`, start points (a, 2), and the mask (a,) of points off `border` (b, 2)."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

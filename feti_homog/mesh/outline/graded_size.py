@@ -56,10 +56,11 @@ def coating_size(arrangement: Arrangement) -> Float:
 
 
 def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: Sequence[Float | float]) -> list[Source]:
-    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps` (k,).
+    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps`.
 
-    The edge length is PASSAGE_EDGE times the passage width, or less if the edges on the other face are shorter. The
-    length grows more slowly than twice the width w + c s^2 / 2 at the distance s along a passage of curvature c.
+    `width` and `curvature` are (k,); `caps` has a limit for each face, () or (k,). The edge length is PASSAGE_EDGE
+    times the passage width, or less if the edges on the other face are shorter. The length grows, but to at most twice
+    the width w + c s^2 / 2 at the distance s along a passage of curvature c.
     """
     growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))
     sources = []
@@ -71,7 +72,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return vertices (v, 2) as sources, with the distance to the next vertex on the torus as length."""
+    """Return distinct `vertices` (v, 2) as sources; the length is the distance to the next vertex on the torus."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -83,7 +84,7 @@ def at_vertices(vertices: Float, size: Float) -> Source:
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """The largest edge lengths of a mesh, in descending order.
+    """The largest edge lengths of a mesh / cell width, in descending order.
 
     Attributes:
         largest: length anywhere.
@@ -118,7 +119,7 @@ class MeshSizes:
 class SizeField:
     """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a smaller graded size.
 
-    Source k acts within the distance `largest` / MAX_GROWTH.
+    Source k acts within the distance `largest` / MAX_GROWTH, where it is among the `nearest` sources.
 
     Attributes:
         largest: largest size.
@@ -126,18 +127,9 @@ class SizeField:
         least: lower bound of the sizes.
     """
 
-    def __init__(
-        self,
-        sources: Sequence[Source],
-        size: Float,
-        largest: float,
-        graded: FromLines | None = None,
-        nearest: int = NEAREST,
-        chunk: int = CHUNK,
-    ) -> None:
-        """Prepare sources on a torus with periods `size` (2,); `nearest` of them count at each of `chunk` points."""
-        self.largest, self.graded = largest, graded
-        self._size, self._bound, self._nearest, self._chunk = size, largest / MAX_GROWTH, nearest, chunk
+    def __init__(self, sources: Sequence[Source], size: Float, largest: float, graded: FromLines | None = None) -> None:
+        """Prepare sources on a torus with periods `size` (2,)."""
+        self.largest, self.graded, self._size, self._bound = largest, graded, size, largest / MAX_GROWTH
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         # For missing neighbours, the tree returns the number of sources, an index with infinite length.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
@@ -146,9 +138,9 @@ class SizeField:
 
     def __call__(self, points: Float) -> Float:
         """Return the sizes (n,) at points (n, 2)."""
-        wrapped, count, parts = wrap(points, self._size), min(self._nearest, self._tree.n), []
-        for k in range(0, max(1, len(points)), self._chunk):
-            some = wrapped[k : k + self._chunk]
+        wrapped, count, parts = wrap(points, self._size), min(NEAREST, self._tree.n), []
+        for k in range(0, max(1, len(points)), CHUNK):
+            some = wrapped[k : k + CHUNK]
             distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)
             sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
             parts.append(np.minimum(self.largest, sizes.min(axis=1)))
@@ -157,13 +149,14 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """Return the edge size on the torus, from passages, vertices, discs and tips.
+    """Return the field of edge sizes on the torus, from passages, vertices, discs and tips.
 
     The sources (x_k, h_k) are the faces of narrow passages between two fibres, or between a fibre and a side or corner
     of the cell, with h_k proportional to the passage width; crossings of circles of radius R and sides at an angle phi,
-    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. The size
-    is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) at the distance d from one of the
-    `tips` (t, 2), where edges have the size h_t; the growth g is MAX_GROWTH.
+    with h_k = R phi / WEDGE; and the mandatory `vertices` (v, 2), with the distance to the next vertex as h_k. Graded
+    sizes are at most h_i + g d_i at the distance d_i from disc i, with h_i from `MeshSizes.on_circles`, and
+    h_t + g max(0, d_t - h_t) at the distance d_t from one of the `tips` (t, 2), where edges have the size h_t; g is
+    MAX_GROWTH.
     """
     size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
     circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
@@ -207,10 +200,10 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
 
 class FromLines:
-    """The size that grows from lines and tips: min(h_i + g d, h_t + g max(0, d - h_t)), see `size_field`.
+    """Sizes min(h_i + g d_i, h_t + g max(0, d_t - h_t)) that grow from lines and tips, with g = MAX_GROWTH.
 
-    Attributes:
-        least: lower bound of the sizes.
+    d_i and d_t are the distances to the nearest line and to the nearest tip, h_i and h_t the edge lengths on the line
+    and at the tip. `least` is a lower bound of the sizes.
     """
 
     def __init__(
@@ -218,7 +211,7 @@ class FromLines:
     ) -> None:
         """Prepare `points` (s, 2) on lines with lengths h_i (s,), and `tips` (t, 2) with the length h_t.
 
-        The distance d refers to the circles (s, 3) through the points or, without circles, to the points.
+        The distance d_i refers to the circles (s, 3) through the points or, without circles, to the points.
         """
         self._size, self._lengths, self._tip, self._circles = size, lengths, tip, circles
         self._points, self._tips = (cKDTree(wrap(x.reshape(-1, 2), size), boxsize=size) for x in (points, tips))

@@ -22,7 +22,7 @@ SAMPLES_OF_AN_EDGE = 3
 
 @dataclass(frozen=True)
 class Curves:
-    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around cell or disc.
+    """Lines of a cell: bridges, and pieces of sides or circles, counter-clockwise around the cell or disc.
 
     Attributes:
         node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
@@ -145,7 +145,7 @@ class Sampling:
 
     Attributes:
         arc, side, bridge: positions along an arc, a piece of a side and a bridge.
-        most_nodes: limit for the nodes on all arcs, on the sides along one axis, or on all bridges.
+        most_nodes: limit for the nodes on all arcs, on one side, or on all bridges.
     """
 
     arc: int
@@ -197,9 +197,7 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
 
     h is the size in `field`, limited by `lines.cap`. A line has at least `least_edges`, () or (c,), edges. It has
     `least_samples` equidistant samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
-
-    Raises:
-        MeshError: the lines would have more than `limit` nodes.
+    Raises MeshError for more than about `limit` nodes.
     """
     lengths = lines.lengths
 

@@ -25,7 +25,7 @@ Marks = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Bridges:
-    """Straight lines between discs `ends` (b, 2), in the directions `angle` (b,), in radians, from the first."""
+    """Straight lines between circles `ends` (b, 2); `angle` (b,) is the direction from the first circle, in radians."""
 
     ends: Int
     angle: Float
@@ -44,7 +44,7 @@ class Outline:
         points: (n, 2) exact positions of the nodes on all lines.
         curves: curves through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
-        disc: (k,) disc or ellipse of each image.
+        disc: (k,) index of the fibre of each circle or ellipse.
         around: (k,) the circle that surrounds each circle; MATRIX for a circle in the matrix.
     """
 
@@ -84,7 +84,7 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the coordinates (k,) of corners and curves on the side through 0 along `axis`, in ascending order."""
+    """Return the ascending coordinates (k,) of corners and crossings with curves on the side through 0 along `axis`."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
@@ -122,7 +122,8 @@ def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
 def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks: Marks) -> OnCircles:
     """Return the curves (v,) and parameters (v,) in [0, 2 pi) of crossings and marks.
 
-    `name` (k,) has the key of each curve in `marks`. Marks within MERGED of another vertex are left out.
+    `crossing` is the result of `on_curves`, and `name` (k,) has the key of each curve in `marks`. Marks within MERGED
+    of another vertex are left out.
     """
     number, points = crossing
     offset, count = points - curves.centres[number], len(number)

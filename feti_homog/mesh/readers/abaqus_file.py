@@ -62,7 +62,7 @@ class _Content:
         nodes: coordinates by node number.
         triangles, lines: nodes by element number; triangles include quadrilaterals.
         sets: elements by kind and name of the set.
-        materials: materials of the sections, by set name.
+        materials: materials of the sections by set name; the set name itself for sections without a material.
         seen: PART and INSTANCE, if the file has them.
         is_assembly: whether the next block belongs to the assembly itself, and not to a part or an instance.
     """
@@ -77,7 +77,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read a block of nodes, elements, sets or sections, skip others; ValueError if it is refused or faulty."""
+        """Read a block of nodes, elements, sets or sections, skip others; ValueError for a refused or faulty block."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:
@@ -129,7 +129,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Add the members of a set: numbers, set names or ranges (GENERATE, step 1 by default); else ValueError."""
+        """Add elements, sets or ranges (GENERATE, default step 1) to a set; ValueError if faulty or over `budget`."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -156,10 +156,11 @@ class _Content:
     def raw_mesh(self) -> RawMesh:
         """Return the mesh, with triangles grouped by set names, and with sets of lines as curves.
 
-        Raises:
-            MeshError: triangles, nodes of elements, or sets of sections are missing.
+        Raises MeshError if triangles, nodes of elements, or sets of sections are missing.
         """
         faults = [] if self.triangles else ["no triangles in it"]
+        if self.triangles and not self.sets:
+            faults = ["no element sets: expected one for each phase, such as *ELEMENT, TYPE=CPS3, ELSET=matrix"]
         elements = self.triangles | self.lines
         lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in self.nodes)
         faults += [f"element {tag}: there is no node {node}" for tag, node in islice(lost, 1)]

@@ -77,7 +77,7 @@ class KeywordBlock:
         For example, *ELEMENT, TYPE=CPE3 has the keyword ELEMENT and the parameter TYPE.
 
         Raises:
-            MeshError: the keyword is unknown or refused, or a mesh keyword has a parameter that is not in READ.
+            MeshError: the keyword is unknown or ambiguous, or a mesh keyword has a parameter that is not in READ.
         """
         word, *rest = (part.strip() for part in line[1:].split(","))
         try:

@@ -81,7 +81,8 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other elements than triangles, quadrilaterals and lines.
+        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals and
+            lines.
     """
     data = input_files.read(path)
     sections = _sections(data.removeprefix(codecs.BOM_UTF8))
@@ -121,7 +122,7 @@ def load(path: Path) -> RawMesh:
     entries = NAME.findall(text)
     if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
         raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
-    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
+    names = {(int(d), int(number)): name.decode(errors="replace").strip() for d, number, name in entries}
     if len(names) < len(entries):
         raise MeshError("$PhysicalNames: one of the numbers has two names")
     return raw_mesh(replace(content, names=names))
@@ -133,7 +134,9 @@ def _sections(content: bytes) -> dict[str, bytes]:
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
     if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
-        raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
+        ansys = ', but like a file of Ansys: with meshio, write with file_format = "gmsh22"'
+        cure = ansys if start.startswith(b"(") else ""
+        raise MeshError(f"not a gmsh mesh file: it does not begin with $MeshFormat{cure}")
     sections, place, end = dict[str, bytes](), 0, len(content.rstrip())
     while place < end:
         header = SECTION.match(content, place)

@@ -141,7 +141,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie on inner edges with a single triangle.
 
-    `plane` (n, 2) are positions from the lower left corner, exact on sides; too many candidates give only a count.
+    `plane` (n, 2) are positions in [0, `size`], exact on sides; too many candidates give only a count of the edges.
     """
     single = mesh.border
     inner = single[~on_sides(plane[single], size)]
@@ -209,7 +209,7 @@ def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes without a partner, except on the side with fewer nodes, and sides without inner nodes."""
+    """List sides without inner nodes, and nodes without a partner, except on the side with fewer nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))

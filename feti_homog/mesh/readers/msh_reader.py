@@ -43,6 +43,7 @@ def read(
     has_voids: bool = False,
     boundary: str = "periodic",
     materials: Collection[str] = (),
+    order: int = 2,
 ) -> CoarseMesh:
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
@@ -52,7 +53,7 @@ def read(
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
     numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
-    relative to the width, nodes first move onto sides (`snapped`).
+    relative to the width, nodes first move onto sides (`snapped`). A remark tells of a lower `order` in the case.
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
@@ -65,12 +66,14 @@ def read(
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
         raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
-    unknown = unknown_phases(raw, known_names(loaded), phases or {}, materials)
+    unknown = unknown_phases(raw, known_names(loaded), phases or {}, sorted(materials, key=phase_names.COATING.__eq__))
     _refuse(path.name, mesh_checks.unlabelled(raw), unknown, mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     raw, moved = (raw, 0.0) if snap is None else snapped(raw, snap)
     mesh = made(raw, path.name, has_voids, boundary)
-    remarks = (*mesh_checks.unused_curves(raw), *mesh.remarks)
+    lower = "[cell] order = 1: linear elements, but the file has quadratic elements: order = 2 keeps them"
+    linear = [lower] if order == 1 and len(raw.middles.tags) else []
+    remarks = (*mesh_checks.unused_curves(raw), *linear, *mesh.remarks)
     return replace(mesh, snapped=moved, remarks=tuple(escaped(f"{path.name}: {remark}") for remark in remarks))
 
 
@@ -124,7 +127,7 @@ def made(raw: RawMesh, path: str, has_voids: bool = True, boundary: str = "perio
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
-    """Raise MeshError if there are faults."""
+    """Raise MeshError if there are faults; each line begins with `path`."""
     if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
         raise MeshError(*lines)
 
@@ -132,10 +135,10 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median of all nodes within `tolerance`, relative to the width, of the outermost node. Two nodes
-    on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both move
-    to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends. Nodes
-    beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
+    A side lies at the median of all outer nodes within `tolerance`, relative to the width, of the outermost node. Two
+    nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
+    move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
+    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
@@ -185,7 +188,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phases that select its name or, if none does, one of its aliases.
+    """Rename each group to the phases that select its name or number or, if none does, one of its aliases.
 
     Other groups keep their names. The entry `debonded` selects curves.
 
@@ -251,12 +254,14 @@ def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Co
     usual = ("matrix", *materials, "fibre", *(f"fibre:{k}" for k in range(2, len(shares) + 1)))
     mixed = any("fib" not in name.casefold() for name in shares)  # numbers of an array are called fibre, fibre:2, ...
     order = sorted(shares, key=lambda k: (mixed and k in materials, mixed and "fib" in k.casefold(), -shares[k]))
-    others = [name for name in order if name != "matrix" and name not in phases]
+    others = sorted({*order} - {"matrix", *phases}, key=lambda k: (k.casefold() != "matrix", order.index(k)))
     first = others[: not has_matrix]
     if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
-        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *phases, phase_names.COATING)]
         entries = {name: wording.toml_value([*some] if some[1:] else some[0]) for name, some in phases.items()}
-        entries |= dict(zip(targets, map(_as_selected, renamed), strict=False))
+        alike = {k: k.casefold() for k in renamed if k.casefold() in {*usual} - {*names, *entries}}
+        entries |= {name: _as_selected(k) for k, name in alike.items()}
+        targets = [name for name in dict.fromkeys(usual) if name not in (*names, *entries)]
+        entries |= dict(zip(targets, (_as_selected(k) for k in renamed if k not in alike), strict=False))
         written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in entries.items())
         condition = f"If {_as_selected(first[0])} is the matrix" if first else "If these are fibres"
         condition += ", set in" if phases else ", add to"

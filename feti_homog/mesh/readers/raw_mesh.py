@@ -49,7 +49,7 @@ class RawMesh:
         element_tags: (m,) element numbers in the file.
         triangles: (m, 3) nodes, numbered from 0.
         group: (m,) index of each element into `groups`.
-        groups: names of the physical surfaces or sets in each combination that elements belong to.
+        groups: for each group, the names of the physical surfaces or sets that its elements belong to.
         curves: (d, 2) node tags at the line ends in each physical curve or line set, by name.
         middles: the middle nodes in second-order triangles.
         aliases: other names of each group, which a case may select; may be empty.
@@ -75,7 +75,7 @@ class RawMesh:
 
     @property
     def border(self) -> Int32:
-        """The edges (k, 2) of only one triangle."""
+        """The edges (k, 2) with a single triangle."""
         pairs = edges(self.triangles)
         _, first, count = np.unique(edge_keys(pairs, len(self.points)), return_index=True, return_counts=True)
         return np.asarray(pairs[first[count == 1]])
@@ -135,7 +135,7 @@ def assembled(
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
         groups: the names of each group.
-        curves, containers, aliases: as in `RawMesh`, surfaces first.
+        curves, aliases: as in `RawMesh`; `containers` is the pair of `container` and `curve_container`.
     """
     order = np.argsort(node_tags)
     points, tags = points[order], node_tags[order]
@@ -177,7 +177,7 @@ def assembled(
 def in_triangles(corners: Int, points: Float) -> Int:
     """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
-    Diagonals join nodes at an even number of sides from the first node of connected quadrilaterals, so that diagonals
+    Diagonals join nodes at an even number of sides from the lowest node of connected quadrilaterals, so that diagonals
     alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal cuts if its smaller triangle
     is MUCH_LARGER times larger or, where even and odd nodes do not alternate, just larger.  The cut depends on
     positions, not on numbers.

@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int, Int32
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
 # The same distance, up to which coarser rounding may have made a polygon of a circle.
-NEARLY_ROUND = 1000 * ROUNDNESS_TOLERANCE
+NEARLY_ROUND = 1e4 * ROUNDNESS_TOLERANCE
 # Least number of edges on a circle or, with middle nodes, of edge halves: regular polygons with fewer edges stay
 # polygons.
 MIN_CIRCLE_EDGES = 8
@@ -35,8 +35,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it
-    cannot, the circle stays a polygon, as do other interfaces.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it cannot
+    flip, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
@@ -79,7 +79,8 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
-    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces within NEARLY_ROUND.
+    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces, without middle nodes,
+    within NEARLY_ROUND.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
@@ -151,7 +152,8 @@ def _closed_loops(
 
     Yields:
         Node classes (k,) in order, unwrapped positions (k, 2) of the classes, unwrapped positions of corner and middle
-        nodes in order, and for each image in the plane the distance (2,) and the numbers of the interface edges.
+            nodes in order, and for each image in the plane its distance (2,) to the unwrapped positions and its
+            interface edges.
     """
     if len(pairs) == 0:
         return
@@ -188,7 +190,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2) onto a circle, side nodes along the side; None for corners and nodes that cannot reach it."""
+    """Move points (k, 2), images of `places`, onto a circle, side nodes along sides; None if a point cannot move."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -210,8 +212,8 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The best conic d.A.d + b.d = 1, d from the mean, is |F^-1 (d - c)| = 1; None if it is no ellipse, or beyond the
-    tolerance of the chain as in `_distance`.
+    The conic d.A.d + b.d = 1 of least squares, with d from the mean, is |F^-1 (d - c)| = 1 for the centre c and the
+    frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -230,7 +232,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
 
 
 def _distance(ellipse: Ellipses, chain: Float) -> float:
-    """Return the distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps over 60 degrees."""
+    """Return the largest distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps > 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

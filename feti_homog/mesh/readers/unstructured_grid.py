@@ -92,8 +92,9 @@ def mesh_of(grid: Grid) -> RawMesh:
     types[(types == POLYGON) & (counts == 3)] = 5
     types[((types == POLYGON) | (types == PIXEL)) & (counts == 4)] = 9
     grid, faults = replace(grid, types=types, nodes=nodes), _other_cells(types, counts, grid.first)
-    integers = [k for k, values in data.items() if k != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"]
-    name = next((name for name in (PHASE, *NUMBERS) if name in data), integers[0] if len(integers) == 1 else "")
+    whole = [k for k, v in data.items() if k != DEBONDED and v.ndim == 1 and np.array_equal(v, np.round(v))]
+    only = [k for k in whole if data[k].dtype.kind in "iu"] or whole
+    name = next((name for name in (PHASE, *NUMBERS) if name in data), only[0] if len(only) == 1 else "")
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         faults.append(f"no cell data named {PHASE}, but {', '.join(data) or 'none'}: {expected}")

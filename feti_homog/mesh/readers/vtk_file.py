@@ -86,7 +86,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
-    """Read the nodes of all cells, and the node count of each cell.  Raises MeshError."""
+    """Read nodes and node counts of all cells; `count` and `size` are the numbers behind CELLS.  Raises MeshError."""
     if file.follows("OFFSETS"):
         offsets = file.take(count, "".join(file.line()[1:2])).astype(np.int64)
         if not file.follows("CONNECTIVITY"):
@@ -102,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Yield name, values and width of the arrays in a section for `length` points or cells; skip colour tables."""
+    """Yield name, values and width of arrays for `length` points or cells; skip colour tables.  Raises MeshError."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -162,7 +162,7 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """A reader of lines, words and arrays in a file, with big-endian binary arrays."""
+    """A reader of the lines, words and arrays in a VTK file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False

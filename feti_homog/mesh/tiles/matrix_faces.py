@@ -32,7 +32,7 @@ class CentreLines:
     """Edges of the Delaunay triangulation of the disc centres.
 
     Attributes:
-        ends: (e, 2) discs.
+        ends: (e, 2) circles of both discs.
         angle: (e,) direction from the first to the second disc, in radians.
         gap: (e,) distance between the circles.
         facing: (e, 2, 2) the point on each circle that faces the other circle.
@@ -47,7 +47,10 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Connect the centres of discs `which` (n,); clearances are exact up to 1 + CLEAR.  Raises QhullError."""
+    """Connect the centres of the circles `which` (n,) by a Delaunay triangulation.
+
+    Clearances above 1 + CLEAR may be too large.  Raises QhullError if all centres lie on one line.
+    """
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -154,7 +157,7 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """The tiles of the matrix faces, which are cells of a grid.
+    """The tiles of the matrix faces; a tile is a cell of a grid.
 
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.

@@ -77,11 +77,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """Fill a tile with triangles, and avoid triangles with two edges on one circle.
-
-    Raises:
-        MeshError: gmsh cannot fill the tile.
-    """
+    """Fill a tile with triangles, and avoid triangles with two edges on one circle.  Raises MeshError if gmsh fails."""
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
         surfaces, circle, within = _add_surfaces(gmsh, tile)

@@ -33,8 +33,8 @@ class TilePolicy:
 
     Attributes:
         least_discs: cells with fewer discs are one tile.
-        discs: discs in a tile. Small tiles put many nodes on borders, where bridges fix the positions; large tiles are
-            too few for many ranks.
+        discs: discs in a tile. Small tiles have many nodes at fixed positions on bridges; large tiles are too few for
+            many ranks.
     """
 
     least_discs: int = 400
@@ -62,7 +62,7 @@ class Tiling:
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Return whether an arrangement is large and consists of round discs."""
+    """Return whether an arrangement has at least `policy.least_discs` outlines, all of them discs."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
@@ -118,10 +118,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
-    """Cut a cell with the outline `lines` into tiles.
-
-    Without a tiling, the cell is one tile.
-    """
+    """Cut a cell with the outline `lines` into tiles.  Without a tiling, the cell is one tile."""
     if tiles is None:
         return [cell]
     from feti_homog.mesh.tiles import matrix_faces
@@ -245,7 +242,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Make the torus of filled tiles, without voids; also return the tile (m,) of each triangle.
+    """Make the torus of filled tiles without triangles in voids; also return the tile (m,) of each triangle.
 
     `all_nodes` is the node count in the cell.
     """

@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs.  The area is A + P r + pi r^2 (Steiner; core area A, perimeter P)."""
+        """The radii (k,) of discs with the area A + P r + pi r^2 (Steiner); core area A, perimeter P, r^2 = |det F|."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -80,7 +80,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) to the nearest of POINTS or more outline points at vectors (n, k, 2) from centres."""
+        """Return distances (n, k) of places at `offsets` (n, k, 2) from centres to the nearest of POINTS points."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
@@ -98,7 +98,7 @@ class ConvexSums(ConvexCurves):
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
         """Return q points along all outlines (q, 2), unit normals (q, 2), and outline numbers (q,).
 
-        Normals have `count` equidistant directions; points of straight sides are at most 1 / count outlines apart.
+        Normals have `count` equidistant directions; points on straight sides are at most perimeter / count apart.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
         points = self.facing(np.broadcast_to(normal, (len(self), count, 2)))
@@ -132,7 +132,7 @@ class PolygonalRows:
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
+        """Yield each check of this shape: the mask (N,) of faulty rows, maybe all False, and the message."""
         (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
         are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
         yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"

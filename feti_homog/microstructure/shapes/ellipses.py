@@ -128,18 +128,18 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, and both supports; see `ConvexSums.parting`."""
+        """Find the directions that best separate pairs, and the sums of both supports; see `ConvexSums.parting`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return approximate distances (n, k) at vectors d (n, k, 2): ||F^-1 d| - 1| times the mean radius."""
+        """Return approximate distances ||F^-1 d| - 1| sqrt|det F| (n, k) of points at d (n, k, 2) from the centres."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, 2) with the outward normals n (k, 2)."""
+        """Return the points (k, 2) with the outward unit normals n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
@@ -182,7 +182,7 @@ class EllipticRows:
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """Yield the checks of this shape: the mask (N,) of faulty rows, maybe none, and the message."""
+        """Yield each check of this shape: the mask (N,) of faulty rows, maybe all False, and the message."""
         a, b = rows["a"], rows["b"]
         thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
         yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"

@@ -45,7 +45,7 @@ class EffectiveMaterial:
         name: case name.
         version: program version.
         stress_unit: the case's label, empty if it has none.
-        symmetry: in words.
+        symmetry: a sentence for the comments of a card.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.
@@ -116,11 +116,7 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
 
 
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
-    """Return the nearest transversely isotropic material of a result.
-
-    Raises CaseError if the result has no such material, or did not converge; KeyError, TypeError or ValueError if the
-    result is damaged.
-    """
+    """Return the nearest transversely isotropic material of a result.  Raises like `in_axes_of_the_cell`."""
     _stiffness(document)
     computed = document["transversely_isotropic"]
     names = ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial")
@@ -150,7 +146,7 @@ def _material(
 
 
 def require_done(document: Document) -> None:
-    """Raise CaseError for a result that did not converge or has other faults; quote its first fault."""
+    """Raise CaseError with the first fault of a result that is unfinished, did not converge or has other faults."""
     if document["status"] != "done":
         faults = document.get("faults") or ["it was not finished"]
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
@@ -184,7 +180,7 @@ def numbers(value: Any, shape: tuple[int, ...]) -> Float:
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """Return the comment lines at the start of a card, in ASCII."""
+    """Return the comment lines at the start of a card, in ASCII, each after `mark`."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -212,7 +208,7 @@ def number(value: float) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert the first 60 characters of a name to letters, digits and single underscores.
+    """Convert a name to at most 60 letters, digits and single underscores.
 
     The prefix `material_` comes before an identifier that does not begin with a letter.
     """

@@ -18,7 +18,6 @@ components 11, 22, 33, 23, 13, 12 of a tensor, with half the engineering shears.
 """
 
 from collections.abc import Callable, Iterable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +49,10 @@ FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
 COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
-def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: str, shears: Float) -> str:
-    """Return the card of the keywords *MATERIAL, *ELASTIC and *EXPANSION.
+def abaqus(
+    material: effective_material.EffectiveMaterial, anisotropic: str = "ANISOTROPIC", shears: Float = ENGINEERING_SHEARS
+) -> str:
+    """Return the Abaqus card, with the keywords *MATERIAL, *ELASTIC and *EXPANSION.
 
     An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.  `shears` (6,)
     multiplies the strains with engineering shears.
@@ -76,8 +77,9 @@ def _keyword_card(material: effective_material.EffectiveMaterial, anisotropic: s
     return "\n".join(lines)
 
 
-abaqus = partial(_keyword_card, anisotropic="ANISOTROPIC", shears=ENGINEERING_SHEARS)
-calculix = partial(_keyword_card, anisotropic="ANISO", shears=TENSOR_SHEARS)
+def calculix(material: effective_material.EffectiveMaterial) -> str:
+    """Return the CalculiX card: Abaqus' keywords with another name of the type, and with the tensor's shears."""
+    return abaqus(material, "ANISO", TENSOR_SHEARS)
 
 
 def _data_lines(values: Iterable[float]) -> list[str]:

@@ -104,8 +104,8 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
 def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the cell coloured by its mesh error density.  Returns None without finite errors above 0.
 
-    The density is the fraction of the error / the fraction of the area, the largest over all states.  Singular tips lie
-    above the colour range: otherwise the rest of the cell would have one colour.
+    The density is (energy error / energy of the cell) / (area / area of the cell) of a triangle, the largest over all
+    states.  Singular tips lie above the colour range: otherwise the rest of the cell would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]

@@ -33,7 +33,10 @@ WIDTH, FRAME, MOST_HEIGHT = 8.0, 3.6, 6.0  # inches: all panels, an animated cel
 
 @dataclass(frozen=True)
 class DeformedCell(drawn_cell.DrawnCell):
-    """A cell with the colours, scale and labels that all panels share."""
+    """A cell with the colours, scale and labels that all panels share.
+
+    `colours` are as from `plot_helpers.colour_range`; `marks` maps point numbers to titles of landmarks.
+    """
 
     component: str
     colours: tuple[Normalize, Any, str]
@@ -43,9 +46,9 @@ class DeformedCell(drawn_cell.DrawnCell):
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Create the cell with one stress component and one colour range for all given states.
+        """Create the cell with one stress component and one colour range for all states `numbers`; see `draw`.
 
-        The case may name the component; by default all states determine the component, on a path the peak.
+        The case may name the component; by default it follows from all states, or on a path from the peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
@@ -123,8 +126,7 @@ def draw_state(
     The state has index `number` in `out`/result.h5.  Call on one rank.  Returns the caption.
 
     `stress` is a component such as "S11", by default along the largest strain; `scale` multiplies displacements.
-    Colours go from minus `most` to `most`, so that several pictures can have the same scale; by default they suit the
-    state.
+    Colours go from minus `most` to `most`, so that pictures can have one scale; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.  Raises FetiHomogError if
     result.h5 cannot be read, or has no such state.

@@ -1,5 +1,8 @@
 """Draw all pictures of a result folder; load each module of this package only for results with its pictures."""
 
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,9 @@ from feti_homog.report.plots import cell_picture, drawn_cell, plot_helpers
 from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, checkpoints, field_file, landmarks, output_folder, result_json
 from feti_homog.typing import Document
+
+Picture = tuple[str, Callable[[], Figure | Path | None]]
+"""A file name without suffix, and a function that draws a figure, writes a file itself, or has nothing to draw."""
 
 
 def plot(
@@ -37,47 +43,57 @@ def plot(
     number, label or mark, only state_K.png is drawn.  Call on one rank.
 
     Raises:
-        CaseError: the result has no such state or component.
+        CaseError: the result is damaged, or has no such state or component.
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
     """
-    directory, paths = Path(directory), list[Path]()
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     stored = {path.name for path in directory.iterdir()} & {result_json.NAME, checkpoints.FOLDER}
     document = output_folder.latest(directory) if stored else {}
     if component is not None:
         document.setdefault("case", {}).setdefault("output", {})["stress"] = component
-    with mpl.rc_context(look.style):
-        if "unfinished" not in document and document.get("case", {}).get("output", {}).get("fields", True):
-            try:
-                with h5py.File(directory / field_file.NAME, "r") as file:
-                    paths = of_fields(directory, file, document, look, state)
-            except OSError as error:
-                raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
-        if state is None and document.keys() & {"angle", "path", "envelope", "sensitivities"}:
-            from feti_homog.report.plots import response_curves  # most results have no curves
+    return draw(directory, document, slice(None), look, state)
 
-            paths += response_curves.plot(directory, document, look)
+
+def draw(
+    directory: Path, document: Document, share: slice, look: plot_helpers.Look = plot_helpers.PLAIN, state: Any = None
+) -> list[Path]:
+    """Draw a `share` of the pictures of a result, so that every rank can draw others; see `plot`."""
+    pictures, paths = list[Picture](), list[Path]()
+    try:
+        with mpl.rc_context(look.style), ExitStack() as stack:
+            if "unfinished" not in document and document.get("case", {}).get("output", {}).get("fields", True):
+                file = stack.enter_context(h5py.File(directory / field_file.NAME, "r"))
+                pictures += of_fields(directory, file, document, look, state)
+            if state is None and document.keys() & {"angle", "path", "envelope", "sensitivities"}:
+                from feti_homog.report.plots import response_curves  # most results have no curves
+
+                curves = response_curves.drawn(document)
+                pictures += [(name, partial(curve, document, look)) for name, curve in curves.items()]
+            for name, picture in pictures[share]:
+                if isinstance(drawn := picture(), Figure):
+                    drawn = plot_helpers.save(drawn, directory / f"{name}.png", look)
+                paths += [drawn] if drawn is not None else []
+    except OSError as error:
+        raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
     return paths
 
 
 def of_fields(
     directory: Path, file: Any, document: Document, look: plot_helpers.Look, chosen: int | str | None = None
-) -> list[Path]:
-    """Draw the pictures of mesh and fields, or of the `chosen` state alone.
+) -> Iterator[Picture]:
+    """Yield the pictures of mesh and fields, or only of the `chosen` state.
 
-    Returns the picture paths.  Raises CaseError if the result has no such state or component.
+    Raises CaseError if the result has no such state or component.
     """
-    cell, report = drawn_cell.DrawnCell.of(file), reported(document)
+    report, cell = reported(document), cache(partial(drawn_cell.DrawnCell.of, file))
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
     name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
-    if name and any(name not in state or np.isnan(state[name][:]).any() for state in states.values()):
-        names = "S11, S22 or S12, and S33 or von_mises where the constants of all phases give S33"
+    conducts = report.name == "conductivity"
+    if name and (conducts or any(name not in state or np.isnan(state[name][:]).any() for state in states.values())):
+        names = "S11, S22 or S12, and S33, von_mises or principal where the constants of all phases give S33"
+        names = "none; its pictures show the flux along the gradient" if conducts else names
         raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
-
-    def save(figure: Figure, name: str) -> Path:
-        return plot_helpers.save(figure, directory / f"{name}.png", look)
-
     if chosen is not None:
         marks = {n: mark.split(" and ") for n, mark in landmarks.marks(document).items()} if report.is_followed else {}
         labels = {k: [state.attrs["label"], *marks.get(int(state.attrs["point"]), ())] for k, state in states.items()}
@@ -85,19 +101,20 @@ def of_fields(
         if number is None:
             lines = ", ".join(f"{k} ({', '.join(label)})" for k, label in labels.items())
             raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {lines}")
-        return [save(cell_picture.deformed(cell, states[number], document, look), f"state_{number}")]
-    pictures = {"cell": cell_picture.figure, "partition": cell_picture.partition, "mesh_error": cell_picture.mesh_error}
-    figures = ((name, draw(cell, look)) for name, draw in pictures.items())
-    paths = [save(figure, name) for name, figure in figures if figure is not None]
+        yield f"state_{number}", lambda: cell_picture.deformed(cell(), states[number], document, look)
+        return
+    yield "cell", lambda: cell_picture.figure(cell(), look)
+    yield "partition", lambda: cell_picture.partition(cell(), look)
+    yield "mesh_error", lambda: cell_picture.mesh_error(cell(), look)
     if report.is_curve and states:
         from feti_homog.report.plots import deformed_panels
 
         scale = deformed_panels.shown_scale(file, document)
-        paths.append(save(deformed_panels.panels(file, document, scale, look), f"{report.name}_states"))
+        yield f"{report.name}_states", lambda: deformed_panels.panels(file, document, scale, look)
         if report.is_followed and look == plot_helpers.PLAIN:
-            paths.append(deformed_panels.animation(file, document, scale, directory / "path.gif"))
+            yield "path", lambda: deformed_panels.animation(file, document, scale, directory / "path.gif")
     for number, state in {} if report.is_curve else states.items():
-        strain, conducts = state.attrs["strain"], report.name == "conductivity"
+        strain = state.attrs["strain"]
         if conducts and strain[2]:  # along the fibres the gradient is uniform
             continue
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
@@ -106,10 +123,10 @@ def of_fields(
         is_unit = abs(value) == 1.0 and not further_loads
         load = state.attrs["label"].replace("/", "_") if conducts else load
         name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
-        paths.append(save(cell_picture.deformed(cell, state, document, look), report.picture or name))
+        of_state = partial(lambda state: cell_picture.deformed(cell(), state, document, look), state)
+        yield report.picture or name, of_state
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())
-    if (broken and report.name != "conductivity") or (report.is_followed and states):
+    if (broken and not conducts) or (report.is_followed and states):
         from feti_homog.report.plots import traction_plots  # perfect bonding has no picture
 
-        paths.append(save(traction_plots.figure(cell, document, look), "interface"))
-    return paths
+        yield "interface", lambda: traction_plots.figure(cell(), document, look)

@@ -147,7 +147,7 @@ def _records(points: Sequence[Mapping[str, Any]]) -> Array:
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
-    """Label points `numbers` on a curve (points, 2) by pointers, where most room is; crowded ones stay unlabelled."""
+    """Label the points `numbers` of a curve (points, 2) where the most room is.  Crowded points get no label."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": "small", "ha": "center", "va": "center", "bbox": LEGIBLE}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     style |= {"textcoords": "offset points", "arrowprops": pointer}
@@ -173,9 +173,9 @@ def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
 def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure | None:
     """Draw the energies per area as a stack over the leading strain or the path position.
 
-    The position is the number of earlier legs plus the load fraction on the leg. On a proportional path the load rises;
-    where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy.  Returns
-    None for results without energies.
+    The position is the number of earlier legs plus the load fraction on the leg.  On a proportional path the load only
+    rises: where bonds break, the cell drops to the next branch that carries the load, and breaks lose more energy than
+    along all equilibria.  Returns None for results without energies.
     """
     points = document.get("path") or [{}]
     if "work" not in points[0]:
@@ -220,7 +220,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
 
 
 def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None) -> Array:
-    """Return the values of an entry along the path, from the unloaded cell onwards.
+    """Return the values (n,) of an entry at n drawn positions of the path, from the unloaded cell onwards.
 
     Up to the first point, and between the points `rising` of a rising load, the response is proportional to the load:
     elastic energies grow with its square, and losses are constant.  On other paths stresses and strains are linear

@@ -32,15 +32,14 @@ SYMBOLS = {
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES},
     "temperature": r"\Delta{T}",  # without a space, at which titles are wrapped
 }
-VON_MISES = "von_mises"
-STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES}
-STRESS_SYMBOLS[VON_MISES] = r"\sigma_{vM}"
+DERIVED = {"von_mises": r"\sigma_{vM}", "principal": r"\sigma_{1}"}  # from all components
+STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in voigt.SPATIAL_STRESSES} | DERIVED
 # Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)},
-    VON_MISES: ("stress_33", None),  # and the tables of all other components
+    **dict.fromkeys(DERIVED, ("stress_33", None)),  # and the tables of all other components
 }
 OUTLIERS = 0.005  # area fraction that may lie outside a colour range, at either end
 # Colours of curves, by Okabe and Ito: colour-blind readers can tell them apart.
@@ -145,7 +144,7 @@ def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, 
 def add_triangles(axes: Axes, points: Array, triangles: Array) -> TriMesh:
     """Add triangles to the axes as pixels, also in vector graphics.
 
-    Matplotlib's `tripcolor` makes a path of each triangle to find the limits, which takes longer than all the rest.
+    Matplotlib's `tripcolor` makes paths of all triangles to find limits, which takes longer than the rest of a plot.
     """
     x, y = points.T
     mesh = TriMesh(Triangulation(x, y, triangles), rasterized=True)
@@ -169,9 +168,9 @@ def draw_segments(
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, Colormap, str]:
     """Choose the colour range and the colour map of a stress.
 
-    Zero is white, tension red and pressure blue in all pictures; the range ends near the values, or is symmetric about
-    zero if tension and pressure are similar.  Values (n,), or (states, n) in one range, have weights `areas` (n,), 1 by
-    default: meshes are fine at tips, where stresses are singular.  Returns range, map, and ends like `value_range`.
+    Zero is white, tension red and pressure blue in all pictures.  The range is the `value_range` of values (n,) or
+    (states, n), or symmetric about zero if tension and pressure are similar.  Without `areas` (n,), the many small
+    elements at tips, where stresses are singular, widen the range.  Returns range, map, and ends like `value_range`.
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
@@ -237,7 +236,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
     Only strains with a macroscopic stress count, or all if no stress acts.
     """
-    if chosen in STRESS_SYMBOLS:
+    if chosen != "auto":
         return chosen
     strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
     loaded = path_curves.components_above(path_curves.FAINT, stresses) or list(range(strains.shape[1]))
@@ -248,9 +247,10 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     """Return the stress at each drawn node (p,): the mean over the adjacent triangles of its body."""
     name, column = STRESS_TABLES[component]
     table = state[name]
-    if component == VON_MISES:  # by element means, as in `viewed_states`
+    if component in DERIVED:  # by element means, as in `viewed_states`
         shears = state["axial_stress"][:] if "axial_stress" in state else np.zeros((len(table), 2))
-        table = voigt.spatial_von_mises(state["stress"][:], table[:], shears)
+        parts = state["stress"][:], table[:], shears
+        table = voigt.spatial_von_mises(*parts) if component == "von_mises" else voigt.spatial_principal(*parts)[:, 0]
     return node_means(triangle_means(table, column, drawn), drawn)
 
 

@@ -1,7 +1,6 @@
 """Draw numbers of result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,21 +17,16 @@ from feti_homog.report.text.summary import reported
 from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
+Curve = Callable[[Document, plot_helpers.Look], Figure | None]
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 CELL = (0.95, 0.42)  # width and height of an entry, inches
 FAINTEST = 0.005  # smaller entries have no number
 
 
-def plot(directory: Path, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> list[Path]:
-    """Draw all pictures that need only result.json; return their paths."""
-    name = reported(document).name
-    pictures = {"sensitivities": sensitivities(document, look), "energy": path_picture.energies(document, look)}
-    pictures |= {name: CURVES[name](document, look)} if name in CURVES else {}
-    return [
-        plot_helpers.save(drawn, directory / f"{name}.png", look)
-        for name, drawn in pictures.items()
-        if drawn is not None
-    ]
+def drawn(document: Document) -> Mapping[str, Curve]:
+    """Return the functions that draw pictures from result.json only, by picture name."""
+    curves, name = dict[str, Curve](sensitivities=sensitivities, energy=path_picture.energies), reported(document).name
+    return curves | ({name: CURVES[name]} if name in CURVES else {})
 
 
 def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
@@ -166,4 +160,4 @@ def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLA
     return picture
 
 
-CURVES = {"angle": angle, "path": path_picture.figure, "envelope": envelope}
+CURVES: dict[str, Curve] = {"angle": angle, "path": path_picture.figure, "envelope": envelope}

@@ -104,7 +104,8 @@ def _limit(column: Sequence[Axes]) -> None:
 def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw; return their names in result.h5.
 
-    For a path: peak (or first state), then valley or last state with tractions; else the middle of partial debonding.
+    A path gives the state at the peak (or the first), and the state in the valley after the peak (or the last with
+    tractions).  Other analyses give the middle one of the partly debonded states (or the last with tractions).
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
@@ -164,8 +165,8 @@ class Coordinate:
 def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     """Return the coordinate of the interface nodes along a body outline.
 
-    On round fibres and their coatings the coordinate is the normal direction (degrees).  On other bodies it is the arc
-    length, counterclockwise from the node whose normal is nearest to x1; several boundaries follow each other.
+    It is the normal direction (degrees) on round fibres and their coatings.  On other bodies it is the arc length,
+    counterclockwise from the node whose normal is nearest to x1, or from an open end; boundaries follow each other.
     """
     file, edges = cell.file, cell.interface.nodes
     of_body = np.flatnonzero(file["interface/fibre"][:] == body)

@@ -36,7 +36,7 @@ MOST = 9  # number of other constants that are shown
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """Return tables of effective stiffnesses and mesh errors, with contact also under minus the unit strains."""
+    """Return tables of the effective stiffness and its mesh errors; with contact, also under negative unit strains."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -185,7 +185,7 @@ def cell_constants(document: Document) -> list[Table]:
 
 
 def _with_estimates(document: Document) -> str:
-    """Name the kind of composites with estimates: without the property that excludes this cell."""
+    """Name the composites that have estimates, by a property that this cell lacks, as in "cells without voids"."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if len(cell.get("fractions", ())) == 1:
         return "composites"
@@ -217,7 +217,7 @@ def constants(document: Document) -> dict[str, float]:
 
 
 def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
-    """Rename numbers from cell axes to material axes; expansions keep their names."""
+    """Rename constants from cell axes to material axes.  Normal expansions keep their names; others are left out."""
     places = {name: engineering_constants.OF_THE_CELL[name] for name in ENGINEERING}
     places |= {name: name for name in engineering_constants.MATERIAL_EXPANSIONS[:3]}
     return {name: numbers[constant] for name, constant in places.items() if constant in numbers}

@@ -17,7 +17,7 @@ ROWS = 15  # rows of the table, unless the caller limits them
 def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path, with totals above rows of points.
 
-    There are at most `limit` rows, by default `ROWS`.  The first five of these columns appear, a line names the others:
+    There are at most `limit` rows, by default `ROWS`.  The first five of these columns appear; a line names the others:
     leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)

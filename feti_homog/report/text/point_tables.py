@@ -42,7 +42,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of stiffnesses or stresses at up to `limit` angles.  Narrow tables also have node counts."""
+    """Return the table of stiffnesses or stresses at up to `limit` angles (None: all), with counts if narrow."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -88,7 +88,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Describe the debonded percentage of the interfaces.  With several phase pairs, each has its own."""
+    """Describe the debonded percentage of all interfaces and, for several sections, of each phase pair."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -98,7 +98,7 @@ def debonded(document: Document, point: Point) -> list[str]:
 
 
 def envelope_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of onset loads and first breaks in at most `limit` directions."""
+    """Return the table of onset loads and first breaks in at most `limit`, or `ENVELOPE_ROWS`, directions."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
     title = f"Onset of debonding in the plane {', '.join(axes)}"
@@ -129,7 +129,7 @@ def envelope_table(document: Document, limit: int | None = None) -> Table:
 
 
 def components(point: Point) -> tuple[float, float]:
-    """Return both components of the onset load."""
+    """Return both components, factor * (cos, sin), of the load at onset in a direction."""
     angle, load = radians(point["angle"]), float(point["factor"])
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
@@ -142,7 +142,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return [table of the largest G by angle and load], for a single load with all rates; [] without tips."""
+    """Return [table of the largest G by angle and load]; [] without tips.  A single load's table has all rates."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

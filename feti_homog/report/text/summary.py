@@ -28,7 +28,7 @@ class ReportedAnalysis:
     """The title and states of an analysis in reports.
 
     Attributes:
-        name: type of the analysis, and of its entry in result.json except for the stiffness.
+        name: type of the analysis; angle, path, load and envelope have an entry of this name in result.json.
         title: the name in words.
         is_curve: whether the states are points of a curve, shown side by side.
         is_followed: whether the states follow a load path, so that landmarks choose among them.
@@ -62,8 +62,7 @@ def summary(document: Document) -> str:
     """Return the printed summary of a result.
 
     The summary has cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
-    Lines have up to 79 characters, tables up to 100, except for long names.  Raises KeyError if the document lacks a
-    key.
+    Lines have up to 79 characters, tables up to 100, except for long names.  Raises KeyError for a missing key.
     """
     size, solver = document["memory"], document["solver"]
     names = {"ranks": "rank", "subdomains": "subdomain", "dofs": "dof"}
@@ -210,7 +209,7 @@ def _number(count: int, name: str) -> str:
 
 
 def phase_tables(document: Document) -> list[Table]:
-    """Return tables of stresses and utilisations of the phases; [] without stresses.  Curves show only some points."""
+    """Return tables of phase stresses and utilisations, at some points of a curve; [] without stresses."""
     phases = document.get("phase_stresses", ())
     if not phases:
         return []

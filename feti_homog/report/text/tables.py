@@ -95,7 +95,7 @@ class Table:
         above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text, the title replaces the head of the first column.
         abreast: rows per line of text, without heads; 0 for one row per line with heads.
-        most_columns: largest number of columns after the first; others form blocks below.  Blocks omit unknown rows.
+        most_columns: largest number of columns after the first; others form blocks below.  Blocks omit rows of UNKNOWN.
     """
 
     title: str
@@ -109,7 +109,7 @@ class Table:
 
     @property
     def blocks(self) -> list[tuple[Sequence[Column], Sequence[Sequence[Any]]]]:
-        """Return the columns and rows of each block."""
+        """Return the columns and rows of each block, without rows of UNKNOWN."""
         parts = [slice(k, k + self.most_columns) for k in range(1, len(self.columns), self.most_columns)]
         rows = ([[*row[:1], *row[part]] for row in self.rows] for part in parts)
         known = [[row for row in block if set(row[1:]) != {UNKNOWN}] for block in rows]

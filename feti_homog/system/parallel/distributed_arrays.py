@@ -92,7 +92,7 @@ def allgather_rows(comm: Intracomm, part: Array, counts: Int) -> Array:
 def share_columns(comm: Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
     """Return solve(B) on every rank for B (n,) or (n, k); every rank solves for a share of the columns.  Collective.
 
-    B is equal on all ranks.
+    B is equal on all ranks, and `solve` must not communicate.
     """
     columns = B.shape[1] if B.ndim == 2 else 1
     if comm.size == 1 or columns == 1:

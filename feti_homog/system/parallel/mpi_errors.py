@@ -87,7 +87,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """Call main() on every rank, and return its exit code.  Collective.
 
     If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints it, and its exit code is returned.
-    After any other exception, or a FetiHomogError on some ranks alone, the rank prints it and aborts the job.
+    After any other exception, or a FetiHomogError only on some ranks, the rank prints it and aborts the job.
     """
     try:
         return main()
@@ -149,7 +149,7 @@ def _lines(error: FetiHomogError) -> str:
 
 
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
-    """Call a function; return its result and None, or None and its exception, a FetiHomogError if a file failed."""
+    """Call a function; return (result, None) or (None, exception); OSError with a file name becomes FetiHomogError."""
     try:
         return function(*args, **kwargs), None
     except OSError as error:

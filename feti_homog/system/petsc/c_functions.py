@@ -93,7 +93,7 @@ class CallbackErrors:
 
     @contextmanager
     def raised(self) -> Iterator[None]:
-        """Context manager: call PETSc in a block; at its end, raise the stored exception in place of PETSc's error."""
+        """Context manager for calls of PETSc: at the end, raise and clear the stored exception, else PETSc's error."""
         try:
             yield
         except PETSc.Error:

@@ -48,6 +48,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
     Raises:
         LibraryError: petsc4py cannot be loaded, for example because it was built for another NumPy.
+        RuntimeError: PETSc does not start with these words.
     """
     import petsc4py
 

@@ -116,7 +116,7 @@ def _is_place(text: str) -> bool:
 
 
 def _words_of(file: str) -> list[str]:
-    """Return the words of an options file; [] if it is unreadable, or does not contain PETSc's options alone."""
+    """Return the words of an options file; [] unless it is readable and contains only PETSc's options."""
     try:
         lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
     except (OSError, ValueError):  # ValueError: the name has a null character
@@ -203,7 +203,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 def petsc_words(options: Mapping[str, str]) -> list[str]:
     """Return the words with which PETSc starts, from options by name without dash.
 
-    Flags that PETSc reads itself are set or left out.  False flags of the solver stay: a case may set them true.
+    Flags that PETSc reads itself are set or left out.  False flags of the solver stay: they override the case.
     """
     texts = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
     pairs = [(f"-{name}", text) for name, text in texts.items() if text is not None]

@@ -38,7 +38,7 @@ def case_options(options: Mapping[str, values.Value]) -> Iterator[None]:
         in_database = given_options()
         if faults := faults_of_solvers(in_database):
             raise CaseError(*faults)
-        # Some options are read by larger solvers alone: names unlike the names in the table wait for `refuse_unused`.
+        # Only larger solvers read some options: names unlike the names in the table wait for `refuse_unused`.
         _refuse_unread([name for name in in_database if table.almost_in_table(name) and not values.is_flag(name)])
         yield
     finally:
@@ -96,7 +96,7 @@ NO_SUCH_METHOD = "requested KSP type"
 
 
 class _Identity:
-    """The identity as a 1 x 1 shell matrix and shell preconditioner, like the dual problem."""
+    """The identity as a 1 x 1 shell matrix and shell preconditioner, in place of the dual problem."""
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)

@@ -24,9 +24,7 @@ STATM = Path("/proc/self/statm")
 
 
 def opened(path: Path, pipes: bool = False) -> BinaryIO:
-    """Open a regular file for reading.
-
-    With `pipes`, pipes and devices are accepted, too, such as `<(...)` of a shell.
+    """Open a regular file for reading; with `pipes`, also a pipe or a device, such as `<(...)` of a shell.
 
     Raises:
         OSError: the file cannot be opened, or is not a regular file.
@@ -42,7 +40,7 @@ def opened(path: Path, pipes: bool = False) -> BinaryIO:
 
 
 def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
-    """Return the content of a file; see `opened`.
+    """Return the content of a file; `pipes` is as in `opened`.
 
     Raises:
         OSError: as in `opened`, and if a file has more than `most` bytes.
@@ -63,9 +61,10 @@ def unreadable(path: Path, error: OSError) -> FetiHomogError:
 
 
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
-    """Return function(path), computed in a child process with at most `memory` further bytes.
+    """Compute function(path), a picklable result, in a child process with at most `memory` further bytes.
 
-    The child ends with this process, after `seconds` of processor time (None: by file size), or 30 times as long.
+    The child ends with this process, or after `seconds` of CPU time (None: by file size), or after 30 `seconds` by the
+    clock.
 
     Raises:
         FetiHomogError: the function raises it.

@@ -31,7 +31,7 @@ STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
 def prepare_environment(environment: MutableMapping[str, str]) -> None:
-    """Set the variables of SETTINGS that are not set; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
+    """Set the variables of SETTINGS that `environment` lacks; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1."""
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)
@@ -81,7 +81,7 @@ def spare_memory() -> float:
 
 
 def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
-    """Call `trim_memory`, and reset the peak of memory; if the system refuses, the old peak stays."""
+    """Call `trim_memory(kept)`, and reset the peak of memory; if the system refuses, the old peak stays."""
     trim_memory(kept)
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)
@@ -105,7 +105,7 @@ def prefer_own_toolkits() -> None:
 def ignore_settings_of_the_folder() -> None:
     """Keep Matplotlib from reading `matplotlibrc` in the current folder and from opening windows.
 
-    Matplotlib reads this file on import, and fails if it is damaged: if it exists, another folder is current meanwhile.
+    Matplotlib reads this file on import, and fails if it is damaged.  So if it exists, import Matplotlib now, from "/".
     """
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:

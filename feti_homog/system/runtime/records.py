@@ -100,7 +100,7 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
 
 
 def _restored_value(hint: Any, value: Any) -> Any:
-    """Convert a value of a document to the type `hint`, or None if `hint` allows it.  Raises like `restored`."""
+    """Convert a value of a document to the type `hint`, or keep None if `hint` allows it.  Raises like `restored`."""
     if value is None and without_none(hint) != hint:
         return None
     hint = without_none(hint)

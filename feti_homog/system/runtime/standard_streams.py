@@ -35,10 +35,10 @@ KEPT = "\n\t"  # characters that are printed although they are not printable; ot
 
 
 def end_on_signals() -> None:
-    """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU, with exit code 128 + signal.
+    """Start a thread that ends the process after SIGINT, SIGTERM or SIGXCPU; the exit code is 128 + signal.
 
-    Before the end, rank 0 prints a line on standard error, and lock files and unfinished files are removed.  Signals
-    that are ignored, as in a background job, remain ignored; SIGPIPE is blocked.  Call this before any thread starts.
+    Before the end, rank 0 prints a line and `remarks` on stderr, and lock files and unfinished files are removed.
+    Signals that are ignored, as in a background job, stay ignored; SIGPIPE is blocked.  Call this before threads start.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # SIGPIPE is not needed: a write reports that the reader of a pipe has closed it.
@@ -121,7 +121,7 @@ class Progress:
         self._inner_seconds = [0.0]  # times of stages within the open stages, with the innermost open stage last
 
     def say(self, line: str) -> None:
-        """Print one line on rank 0, above a progress bar."""
+        """Print one line on rank 0, above a progress bar; print nothing if `quiet`."""
         if self.on_terminal:
             from tqdm import tqdm
 
@@ -134,7 +134,7 @@ class Progress:
     def stage(self, name: str) -> Iterator[list[str]]:
         """Context manager: time a block as a stage of the run and of PETSc's log; print its time unless it raises.
 
-        The block may append remarks to the yielded list, which are printed with the time.  Inner stages are excluded.
+        The block may append remarks to the yielded list, which are printed with the time.  Inner stages do not count.
         """
         from petsc4py import PETSc
 

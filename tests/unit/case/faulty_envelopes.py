@@ -44,7 +44,8 @@ FAULTY_ENVELOPES: dict[str, str] = {
         envelope('["S11", "S22"]', bonds="[interface]\ncontact = false"),
     "[interface] normal_strength, tangential_strength, axial_strength: missing":
         envelope('["S11", "S33"]', bonds="[interface]\ncontact = false", state="generalized"),
-    "[interface] contact: expected false with debonded arcs; ":
+    "[interface] contact: expected false with debonded arcs; [analysis] type = \"envelope\" superposes loads, which "
+    "contact forbids: type = \"path\" finds the onset of one load":
         envelope('["S11", "S22"]', bonds=f"{BONDS}\ndebonded = [{ARC}]"),
     "[interface] normal_strength, tangential_strength, axial_strength: missing; ":
         envelope('["S11", "S33"]', bonds="[interface]\naxial_strength = inf", state="generalized"),

@@ -59,6 +59,13 @@ FAULTY_LOADS: dict[str, str] = {
         path("waypoints = [{S11 = 1.0}, {temperature = -100.0}, {temperature = 0.0}]", state="generalized"),
     "[material.matrix] expansion: missing; [load] to.temperature needs it":
         load("to = {temperature = -100.0}", state="generalized").replace("0.222", "0.222\nexpansion = 1e-6"),
+    "[material.fibre] poisson: missing; expected a number above -1\n"
+    "[material.fibre] expansion: missing; [load] to.temperature needs it":
+        load("to = {temperature = -100.0}", state="generalized").replace("0.299", "0.299\nexpansion = 1e-5")
+        .replace("poisson = 0.222\n", ""),
+    "[material.fibre] expanson = 1e-06: unknown key; did you mean expansion?":
+        load("to = {temperature = -100.0}", state="generalized").replace("0.299", "0.299\nexpansion = 1e-5")
+        .replace("0.222", "0.222\nexpanson = 1e-6"),
     "[material.fibre] expansion_axial, expansion_transverse, or one expansion: missing; [load] to.temperature needs it":
         load("to = {temperature = -100.0}", state="generalized").replace("0.299", "0.299\nexpansion = 1e-5")
         .replace(FIBRE, f"[material.fibre]\n{TRANSVERSE}{AXIAL}G_axial = 15.0\n"),

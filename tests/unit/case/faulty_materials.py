@@ -87,9 +87,16 @@ FAULTY_MATERIALS: dict[str, str] = {
     "[material.fibre] young, poisson (isotropic) and angle (orthotropic): exclude each other":
         fibre("young = 1.0\npoisson = 0.2\nangle = 30.0\n"),
     "[material.fibre] G12: missing": fibre("E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\n", "stress"),
-    "[material.fibre] E2: missing\n[material.fibre] nu12: missing\n"
-    "[material.fibre] G12: missing; expected a number above 0; axis 3 is along the fibres; for data sheets: E_axial":
+    "[material.fibre] E2: missing\n[material.fibre] nu12: missing\n[material.fibre] G12: missing\n"
+    "[material.fibre] E3, nu13, nu23: missing; plane strain needs them; axis 3 is along the fibres; for data sheets":
         fibre("E1 = 230.0\n"),
+    "[material.fibre] E_transverse: missing; expected a number above 0\n"
+    "[material.fibre] nu_transverse, G_transverse: missing; expected one\n"
+    "[material.fibre] nu_axial, G_axial: missing; generalized plane strain needs them":
+        fibre("E_axial = 230.0\n", "generalized"),
+    "[material.fibre] nu_transverse, G_transverse: missing; expected one\n"
+    "[material.fibre] nu_axial: missing; plane strain needs it":
+        fibre("E_axial = 230.0\nE_transverse = 14.0\n"),
     "[material.fibre] E3, nu13, nu23: missing; plane strain needs them": fibre(ORTHOTROPIC),
     "[material.fibre] E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance":
         fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4")),
@@ -107,10 +114,12 @@ FAULTY_MATERIALS: dict[str, str] = {
         fibre(TRANSVERSE + AXIAL + "G_axial = 15.0\nG_transverse = 7.0\n", "generalized"),
     "[material.fibre] G_transverse = 3.5: expected more than E_transverse/4 = 3.5; no material is stable otherwise":
         fibre("E_transverse = 14.0\nG_transverse = 3.5\n", "stress"),
-    "[material.fibre] GT: axis 1 of a data sheet is along the fibres, which are along x3 here: give G_transverse":
+    "[material.fibre] GT: axis 1 of a data sheet is along the fibres, which are along x3 here: give G_transverse\n"
+    "[material.fibre] E_axial, nu_axial: missing; plane strain needs them":
         fibre("E_transverse = 14.0\nGT = 7.0\n"),
     "[material.fibre] E11, E_22, G12, nu12, alpha1: axis 1 of a data sheet is along the fibres, which are along x3 "
-    "here: give E_axial, E_transverse, G_axial, nu_axial, expansion_axial":
+    "here: give E_axial, E_transverse, G_axial, nu_axial, expansion_axial\n"
+    "[material.fibre] nu_transverse, G_transverse: missing; expected one":
         fibre("E11 = 230.0\nE_22 = 15.0\nG12 = 15.0\nnu12 = 0.2\nalpha1 = 1e-6\n"),
     "[material.fibre] expansion = [0.0, 1e-05, 1e-05]: expected a number, or expansion_axial and expansion_transverse":
         fibre(TRANSVERSE + AXIAL + "expansion = [0.0, 1e-5, 1e-5]\n"),

@@ -11,8 +11,8 @@ from feti_homog.homogenization import partition_policy
 from feti_homog.homogenization.phase_laws import problems
 
 
-def memory(dofs=(100_000,), subdomains=(9,), components=(2,), columns=0):
-    return partition_policy.memory([n // 2 for n in dofs], subdomains, components, columns)
+def memory(case=None, dofs=(100_000,), subdomains=(9,), components=(2,), columns=0):
+    return partition_policy.memory(case or make_case(), [n // 2 for n in dofs], subdomains, components, columns)
 
 
 def solves(case, problem):
@@ -39,6 +39,8 @@ def test_more_unknowns_problems_and_columns_take_more_memory():
     assert base < memory(components=(2, 1)) < 2 * base
     assert memory(columns=10_000) - base == pytest.approx(10_000 * partition_policy.COLUMN_BYTES)
     assert memory(subdomains=(1,)) - base == pytest.approx(100_000 * partition_policy.FACTOR_BYTES)
+    angles = replace(make_case(), analysis=replace(make_case().analysis, type="angle"))
+    assert memory(angles) - base == pytest.approx(100_000 * partition_policy.INTERIOR_BYTES)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,8 @@ def test_the_length_is_that_of_the_matrix_and_the_strength(stiffness, plane, len
     """E' G_Ic / sigma_c^2 with sigma_c = 90 or 60 MPa, E' = 2790 / (1 - 0.33^2) or 2790."""
     strength = {2025.0: 90.0, 900.0: 60.0}[stiffness]
     modulus = 2790.0 / (1 - 0.33**2) if plane == "strain" else 2790.0
-    found = cell_remarks.process_zone(case_of(stiffness, plane=plane))
+    found, traction = cell_remarks.process_zone(case_of(stiffness, plane=plane))
+    assert traction == pytest.approx(strength, rel=1e-12)
     assert found == pytest.approx(modulus * 2.0 / strength**2, rel=1e-12) and found == pytest.approx(length, abs=5e-4)
 
 
@@ -93,8 +94,17 @@ def test_the_warning_replaces_an_accuracy():
     assert warnings(case_of(mesh_size=float(size), refine=int(refine), interface_size=float(interface_size))) == []
 
 
+def test_conductors_have_no_such_length():
+    document = {"cell": CELL, "analysis": {"type": "conductivity"}, "interface": {"conductance": 1.0}}
+    document["material"] = {phase: {"conductivity": 1.0} for phase in ("matrix", "fibre")}
+    assert warnings(cases.parse(document, Path())) == []
+
+
 def test_other_bonds_have_no_such_length():
-    assert cell_remarks.process_zone(case_of(criterion="max")) is None and warnings(case_of(criterion="max")) == []
+    assert (
+        cell_remarks.process_zone(case_of(criterion="max")) == (np.inf, np.inf)
+        and warnings(case_of(criterion="max")) == []
+    )
 
 
 COHESIVE = {
@@ -121,8 +131,20 @@ def test_the_zone_is_that_of_the_shorter_mode_of_the_weakest_pair(shear):
         between = (["coating", "matrix"], ["fibre", "coating"])
         interfaces = [own | {"between": pair} for own, pair in zip(pairs, between, strict=False)]
         document = DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}
-        found = cell_remarks.process_zone(cases.parse(document, Path()))
+        found, _ = cell_remarks.process_zone(cases.parse(document, Path()))
         assert found == pytest.approx(modulus * min(0.05 / 40.0**2, shear / 60.0**2))
+
+
+@pytest.mark.parametrize(("factor", "zones"), [(10.0, 1), (100.0, 0)])
+def test_bonds_that_hold_have_no_zone(factor, zones):
+    """Strong bonds with the least toughness, N^2 / (2 k), have the shortest zone, if they can break at all."""
+    strong = COHESIVE | {f"{mode}_strength": factor * COHESIVE[f"{mode}_strength"] for mode in ("normal", "tangential")}
+    for mode in ("normal", "tangential"):
+        strong[f"{mode}_toughness"] = strong[f"{mode}_strength"] ** 2 / (2 * strong[f"{mode}_stiffness"])
+    pairs = ((COHESIVE, ["coating", "matrix"]), (strong, ["fibre", "coating"]))
+    sections = {"interface": [bond | {"between": pair} for bond, pair in pairs], "cell": CELL | {"coating": 0.1}}
+    lines = cell_remarks.warnings(cases.parse(DOCUMENT | sections, Path()), 20.0, 0.02, np.array([7.5]))
+    assert sum("elements on the interface are up to 0.02 long" in line for line in lines) == zones
 
 
 def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():

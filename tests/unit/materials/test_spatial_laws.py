@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from feti_homog.materials.laws import expansion, out_of_plane, plane_stiffness, spatial_stiffness
+from feti_homog.materials.laws import expansion, missing_constants, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.materials.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 
 AXES = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # of the order 11, 22, 33, 23, 13, 12
@@ -154,13 +154,6 @@ def test_constants_that_a_plane_state_does_not_need_may_be_absent():
 @pytest.mark.parametrize(
     ("material", "words"),
     [
-        (dataclasses.replace(AS4, G_axial=None), "^G_axial: missing; generalized plane strain needs it$"),
-        (dataclasses.replace(AS4, nu_axial=None), "^nu_axial: missing; generalized plane strain needs it$"),
-        (
-            dataclasses.replace(ORTHOTROPIC, E3=None, G23=None),
-            "^E3, G23: missing; generalized plane strain needs them; axis 3 is along the fibres; for data sheets: "
-            "E_axial, E_transverse, nu_axial, nu_transverse, G_axial$",
-        ),
         (Isotropic(1.0, 0.5), "less than 0.5 in generalized plane strain"),
         (General(rows(np.eye(3))), "^stiffness: expected 6x6 in generalized plane strain"),
     ],
@@ -168,6 +161,38 @@ def test_constants_that_a_plane_state_does_not_need_may_be_absent():
 def test_what_does_not_say_a_law_in_space_is_refused(material, words):
     with pytest.raises(ValueError, match=words):
         spatial_stiffness(material)
+
+
+@pytest.mark.parametrize(
+    ("form", "names", "plane", "expected"),
+    [
+        (TransverselyIsotropic, ["E_axial"], "stress", ["nu_transverse, G_transverse: missing; expected one"]),
+        (TransverselyIsotropic, ["E_transverse", "G_transverse"], "stress", []),
+        (TransverselyIsotropic, ["nu_transverse", "nu_axial"], "strain", ["E_axial: missing; plane strain needs it"]),
+        (
+            TransverselyIsotropic,
+            ["E_axial", "E_transverse"],
+            "generalized",
+            [
+                "nu_transverse, G_transverse: missing; expected one",
+                "nu_axial, G_axial: missing; generalized plane strain needs them",
+            ],
+        ),
+        (
+            Orthotropic,
+            ["E1", "nu13", "G13"],
+            "generalized",
+            [
+                "E3, nu23, G23: missing; generalized plane strain needs them; axis 3 is along the fibres; for data "
+                "sheets: E_axial, E_transverse, nu_axial, nu_transverse, G_axial"
+            ],
+        ),
+        (Orthotropic, ["E1"], "stress", []),
+        (Isotropic, ["young"], "generalized", []),
+    ],
+)
+def test_all_constants_that_a_plane_state_lacks_are_named(form, names, plane, expected):
+    assert missing_constants(form, names, plane) == expected
 
 
 def is_refused(material: Material) -> bool:

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from support.cases import FIBRE, MATRIX
 from support.users_meshes import fibre_area, polar_cell
 from unit.mesh.faulty_meshes import grid, node
 from unit.mesh.second_order import FAULTY_MIDDLES, second_order
 
+from feti_homog import Case
 from feti_homog.errors import MeshError
+from feti_homog.mesh.fill import pixel_mesher
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
@@ -39,6 +42,18 @@ def test_quadrilaterals_of_second_order_are_round_fibres(nodes, suffix, tmp_path
     mesh = read(path, phases={"matrix": (1,), "fibre": (2,)} if suffix == ".vtk" else {})
     assert mesh.ellipses.circles == pytest.approx(np.array([[0.5, 0.5, 0.3]]), abs=1e-8)
     assert fibre_area(mesh, 2, 2) == pytest.approx(np.pi * 0.09, rel=1e-3)
+
+
+def test_linear_elements_of_a_mesh_of_second_order_have_a_remark(tmp_path):
+    analysis, materials = {"type": "stiffness", "plane": "strain"}, {"matrix": MATRIX, "fibre": FIBRE}
+    for mesh, expected in ((grid(), 0), (second_order(grid()), 1)):
+        path = _written(mesh, tmp_path)
+        remarks = read(path, order=1).remarks
+        assert len(remarks) == expected and all("[cell] order = 1: linear" in line for line in remarks)
+        for order, some in (({}, remarks), ({"order": 2}, ())):
+            cell = {"geometry": "mesh", "file": str(path)} | order
+            case = Case.parse({"cell": cell, "material": materials, "analysis": analysis})
+            assert pixel_mesher.read_cell(case.cell).remarks == some
 
 
 def test_few_edges_are_a_circle_if_their_middle_nodes_are_on_it(tmp_path):

@@ -9,6 +9,7 @@ from support.other_formats import written
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, draw_state, run
+from feti_homog.errors import FetiHomogError
 from feti_homog.results.viewed_states import read_state
 
 MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}}
@@ -50,6 +51,8 @@ def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_pa
     axes = Figure().subplots()
     draw_state(axes, tmp_path / "out", scale=0.0)
     assert axes.dataLim.min == pytest.approx(corner, abs=1e-9) and axes.dataLim.size == pytest.approx([50, 40])
+    with pytest.raises(FetiHomogError, match=r"^cannot draw state 0 of .*: 'S1'"):
+        draw_state(axes, tmp_path / "out", stress="S1")
 
 
 @pytest.mark.parametrize("suffix", ["msh", "inp", "vtu", "vtk", "mesh"])

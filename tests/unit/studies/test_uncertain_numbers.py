@@ -85,6 +85,9 @@ def test_entries_of_lists_have_the_names_of_their_derivatives():
          "[material.matrix] young = -88.0: expected a number"),
         ([], "[uncertainty]\nmaterial.fibre.yuong = 1.0\n",
          "[uncertainty] material.fibre.yuong: expected a key of the case"),
+        ([], "[uncertainty]\nmaterial.fibre.young = {std = 3.0}\n",
+         "[uncertainty] material.fibre.young.std: expected a key of the case whose value is a number; write "
+         "material.fibre.young = 3"),
         ([], "[uncertainty]\nmaterial.fibre.young = 0.0\n",
          "[uncertainty] material.fibre.young = 0.0: expected a standard"),
         ([("poisson = 0.299", "poisson = 0.299\nstrength.principal = {mean = 80.0, std = 4.0}")], "",

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from PIL import Image
+from support.cases import case_of
 from support.other_formats import written
 from support.pixel_images import MATERIALS, case, quadrilaterals, random_image
 
 from feti_homog import Case, run
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.mesh.fill import pixel_mesher
 from feti_homog.microstructure import label_image
 
 LABELS = {"0": "matrix", "1": "fibre"}
@@ -99,6 +101,21 @@ def test_smooth_outlines_have_the_constants_of_the_table(tmp_path):
     assert np.linalg.norm(away, axis=2).min(axis=0).max() < 0.5 / size
     pixels = run(case(tmp_path / "a.png", None, pixel=1 / size), MPI.COMM_SELF)
     assert np.abs(pixels.effective_stiffness - expected.effective_stiffness).max() < 3e-2 * scale
+
+
+def test_smooth_outlines_preserve_the_areas_of_the_image(tmp_path):
+    """Of small fibres, too, whose steps have few directions."""
+    rng = np.random.default_rng(1)
+    x, image = np.arange(120) + 0.5, np.zeros((120, 120), int)
+    for i, j in np.ndindex(6, 6):
+        a, b = 20 * np.array([i, j]) + rng.uniform(6, 14, 2)
+        image[(x - a) ** 2 + (x[:, None] - b) ** 2 < rng.uniform(4, 6) ** 2] = 1
+    mesh = pixel_mesher.read_cell(case(tmp_path / "a.npy", image, smooth=True, order=2, mesh_size=0.02).cell)
+    (remark,) = mesh.remarks
+    share = image.mean()
+    assert remark.endswith(f"smooth = true: fractions in the image: matrix {1 - share:.6g}, fibre {share:.6g}")
+    found = run(case(tmp_path / "a.npy", None, smooth=True, order=2, mesh_size=0.02), MPI.COMM_SELF)
+    assert found.cell.fibre_fraction == pytest.approx(share, rel=1e-2)
 
 
 def test_smooth_fibres_may_have_coatings_but_no_third_phase_beside_them(tmp_path):
@@ -229,3 +246,20 @@ def test_a_label_without_pixels_is_a_fault(tmp_path):
     with pytest.raises(CaseError) as caught:
         label_image.read_labels(stored(tmp_path / "a.png", 2 * GREY), LABELS, False)
     assert caught.value.faults[1].endswith(line)
+
+
+@pytest.mark.parametrize("smooth", [False, True], ids=["polygons", "smooth"])
+def test_failures_of_gmsh_name_a_cure(tmp_path, monkeypatch, smooth):
+    def fail(dimension):
+        raise Exception("no memory")  # gmsh raises this class
+
+    gmsh = pytest.importorskip("gmsh")
+    monkeypatch.setattr(gmsh.model.mesh, "generate", fail)
+    if smooth:
+        cell, key = case(tmp_path / "a.png", np.kron(np.eye(2), np.ones((9, 9))), smooth=True), "smooth = true"
+    else:
+        (tmp_path / "a.csv").write_text("x,y,radius,sides\n0.5,0.5,0.3,6\n")
+        cell, key = case_of({"geometry": "table", "file": "a.csv", "width": 1.0, "height": 1.0}, tmp_path), "fibres"
+    words = rf"^\[cell\] {key}: gmsh cannot fill the outlines \(no memory\); expected larger"
+    with pytest.raises(MeshError, match=words):
+        run(cell, MPI.COMM_SELF)

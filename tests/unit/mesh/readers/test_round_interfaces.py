@@ -1,5 +1,7 @@
 """Elliptic fibres in meshes of straight edges: found wherever they lie, and followed by refinement."""
 
+import re
+
 import meshio
 import numpy as np
 import pytest
@@ -68,7 +70,7 @@ def test_areas_approach_that_of_the_ellipse_by_h2(stretch, tmp_path):
 
 
 @pytest.mark.parametrize("stretch", [1.0, 1.5])
-@pytest.mark.parametrize(("digits", "remarks"), [(8, 0), (5, 1), (2, 0)])
+@pytest.mark.parametrize(("digits", "remarks"), [(8, 0), (5, 1), (3, 1), (2, 0)])
 def test_fibres_of_rounded_coordinates_are_polygons_with_a_remark(stretch, digits, remarks, tmp_path):
     """Two digits are far from round; middle nodes bend edges, however rounded."""
     path = tmp_path / "a.vtu"
@@ -80,8 +82,10 @@ def test_fibres_of_rounded_coordinates_are_polygons_with_a_remark(stretch, digit
         meshio.Mesh(source.points, source.cells, cell_data={"phase": [k - 1 for k in numbers]}).write(path)
         found = read(path).remarks
         assert len(found) == remarks * (order == 1)
-        assert all(f"semi-axes {axes} around (0.5, 0.5), off by " in line for line in found for axes in
-                   [" and ".join(f"{x:g}" for x in sorted((0.2, 0.2 * stretch), reverse=True))])  # fmt: skip
+        for line in found:
+            axes = re.search(r"semi-axes (\S+) and (\S+) around \((\S+), (\S+)\), off by ", line).groups()
+            exact = [max(0.2, 0.2 * stretch), min(0.2, 0.2 * stretch), 0.5, 0.5]
+            assert [float(word) for word in axes] == pytest.approx(exact, abs=10.0**-digits)
         assert (len(read(path).arc_edges) == 0) == (order == 1 and digits < 8)
 
 

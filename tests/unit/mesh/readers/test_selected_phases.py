@@ -38,3 +38,22 @@ def test_phases_that_are_proposed_read_the_mesh(tmp_path, names, phases, materia
 )
 def test_a_group_in_two_phases_is_refused(tmp_path, names, phases, fault):
     assert any(fault in line for line in replace(grid(), names=names).faults(tmp_path, phases=phases))
+
+
+@pytest.mark.parametrize(
+    ("names", "proposed"),
+    [
+        ({1: "Fibre", 2: "Interphase", 3: "Matrix"}, '{matrix = "Matrix", fibre = "Fibre", coating = "Interphase"}'),
+        ({1: "1", 2: "2", 3: "3"}, '{matrix = "1", fibre = "3", coating = "2"}'),
+        ({1: "Coating", 2: "MATRIX", 3: "glass"}, '{matrix = "MATRIX", coating = "Coating", fibre = "glass"}'),
+    ],
+)
+def test_proposals_follow_the_materials_whatever_the_capitals(tmp_path, names, proposed):
+    """Of 50 %, 12.5 % and 37.5 % of the area: alike names belong together, and a coating is the smallest."""
+    elements = {}
+    for tag, (kind, _, _, nodes) in grid().elements.items():
+        number = 1 if tag <= 16 else 2 if tag <= 20 else 3
+        elements[tag] = (kind, number, number, nodes)
+    mesh = replace(grid(), elements=elements, names=names)
+    fault = mesh.faults(tmp_path, materials=("matrix", "coating", "fibre"))[-1]
+    assert f"add to [cell]: phases = {proposed}. Shares" in fault

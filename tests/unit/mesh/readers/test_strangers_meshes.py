@@ -121,6 +121,30 @@ def in_few_letters(path: Path) -> None:
     path.write_text(text.replace("*Element, type", "*ELEM, TYP"))
 
 
+def by_way_of_med(path: Path) -> None:
+    """Convert by gmsh, which fills the names in MED files with blanks."""
+    import gmsh
+
+    by_gmsh(path.with_name("b.med"), named())
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path.with_name("b.med")))
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    assert b'"E-Glass  ' in path.read_bytes()
+
+
+def as_floats(path: Path) -> None:
+    """Write material numbers as 1.0 and 2.0, beside stresses."""
+    by_meshio(path.with_name("b.vtu"), "material_id")
+    mesh = meshio.read(path.with_name("b.vtu"))
+    (numbers,) = mesh.cell_data["material_id"]
+    mesh.cell_data = {"material_id": [numbers.astype(float)], "stress": [0.3 * numbers]}
+    mesh.write(path)
+
+
 SETS = {"matrix": "Resin", "fibre": ["Glass"]}
 FILES = {
     "gmsh, names": ("a.msh", lambda path: by_gmsh(path, named()), WORDS),
@@ -134,8 +158,10 @@ FILES = {
     "gmsh's VTK": ("a.vtk", lambda path: by_gmsh(path, named()), CODES),
     "meshio's gmsh": ("a.msh", lambda path: by_meshio(path, "gmsh:physical", "gmsh22"), CODES),
     "meshio's Abaqus": ("a.inp", lambda path: by_meshio(path, None, "abaqus", sets=True), SETS),
+    "gmsh's MED": ("a.msh", by_way_of_med, WORDS),
     "meshio's VTU": ("a.vtu", lambda path: by_meshio(path, "mat_id"), {"matrix": [1], "fibre": 2}),
     "meshio's Medit": ("a.mesh", lambda path: by_meshio(path, "medit:ref", "medit"), CODES),
+    "whole numbers as floats": ("a.vtu", as_floats, CODES),
     "VTK": ("a.vtu", by_vtk, CODES),
     "Abaqus/CAE": ("a.inp", abaqus_cae, WORDS),
     "Abaqus/CAE, few letters": ("a.inp", in_few_letters, WORDS),
@@ -234,6 +260,12 @@ def test_shares_of_a_group_are_those_of_all_its_surfaces(tmp_path):
     elements = {tag: (kind, own, tag, nodes) for tag, (kind, own, _, nodes) in grid().elements.items()}
     fault = replace(grid(), elements=elements, names={2: "Glass", 1: "Epoxy"}).faults(tmp_path)[-1]
     assert 'If "Epoxy" is the matrix' in fault and '"Epoxy": 75 %' in fault and '"Glass": 25 %' in fault
+
+
+def test_an_ansys_file_by_meshio_is_refused_with_the_way_out(tmp_path):
+    by_meshio(tmp_path / "a.msh", None)
+    with pytest.raises(MeshError, match=r'like a file of Ansys: with meshio, write with file_format = "gmsh22"'):
+        read(tmp_path / "a.msh")
 
 
 def test_a_meshed_void_is_no_phase_to_be_named(tmp_path):

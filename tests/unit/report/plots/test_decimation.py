@@ -110,16 +110,17 @@ def test_panels_leave_few_places_empty(panels, ratio, grid):
 
 
 @pytest.mark.parametrize(
-    ("stress", "S33", "axial", "expected"),
+    ("stress", "S33", "axial", "von_mises", "principal"),
     [
-        ([3.0, 0.0, 0.0], 0.0, None, 3.0),
-        ([0.0, 0.0, 2.0], 0.0, None, 2.0 * np.sqrt(3.0)),
-        ([5.0, 5.0, 0.0], 5.0, [0.0, 0.0], 0.0),
-        ([0.0, 0.0, 0.0], 0.0, [3.0, -4.0], 5.0 * np.sqrt(3.0)),
+        ([3.0, 0.0, 0.0], 0.0, None, 3.0, 3.0),
+        ([-3.0, -4.0, 0.0], 2.0, None, np.sqrt(31.0), 2.0),
+        ([0.0, 0.0, 2.0], 0.0, None, 2.0 * np.sqrt(3.0), 2.0),
+        ([5.0, 5.0, 0.0], 5.0, [0.0, 0.0], 0.0, 5.0),
+        ([0.0, 0.0, 0.0], 0.0, [3.0, -4.0], 5.0 * np.sqrt(3.0), 5.0),
     ],
 )
-def test_a_uniform_stress_has_its_von_mises_stress(
-    tmp_path: Path, stress: list[float], S33: float, axial: list[float] | None, expected: float
+def test_a_uniform_stress_has_its_von_mises_and_its_largest_principal_stress(
+    tmp_path: Path, stress: list[float], S33: float, axial: list[float] | None, von_mises: float, principal: float
 ) -> None:
     with h5py.File(write(tmp_path, sample(3) if axial is None else in_space(sample(3))), "r+") as file:
         state, values = file["state/1"], {"stress": stress, "stress_33": S33, "axial_stress": axial}
@@ -127,4 +128,5 @@ def test_a_uniform_stress_has_its_von_mises_stress(
             if value is not None:
                 state[name][:] = value
         drawn = DrawnCell.of(file).drawn
-        np.testing.assert_allclose(plot_helpers.nodal_stress(state, "von_mises", drawn), expected, atol=1e-12)
+        np.testing.assert_allclose(plot_helpers.nodal_stress(state, "von_mises", drawn), von_mises, atol=1e-12)
+        np.testing.assert_allclose(plot_helpers.nodal_stress(state, "principal", drawn), principal, atol=1e-12)

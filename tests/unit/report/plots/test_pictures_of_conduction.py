@@ -6,6 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog import Case, run
+from feti_homog.errors import CaseError
 from feti_homog.report.plots import cell_picture, drawn_cell, figures, plot_helpers
 from feti_homog.report.text.constant_tables import conductivity
 
@@ -39,6 +40,11 @@ def test_each_picture_has_the_flux_along_its_own_gradient(solved):
             flux = next(shapes for shapes in axes.collections if shapes.get_array() is not None).get_array()
             weights = cell.drawn.node_areas / cell.drawn.node_areas.sum()
             assert weights @ np.ravel(flux) == pytest.approx(result.effective_conductivity[i, i], rel=0.02)
+
+
+def test_a_conduction_has_no_stress_to_draw(solved):
+    with pytest.raises(CaseError, match=r"--component S12: expected a stress that .* has: none; its pictures show"):
+        figures.plot(solved[0], component="S12")
 
 
 def test_bounds_stand_beside_the_conductivity_that_they_bound():

@@ -111,6 +111,8 @@ def test_tests_are_changes_of_one_case(tmp_path):
          "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
         ("strain = [0.1, 0.0, 0.0]", "E11, S11\n10.0, 1.0\n",
          "[measured] curve: a strain of 10 is beyond the end of the path at 0.1; in per cent?"),
+        ("strain = [0.1, 0.0, 0.0]", "E11, S11\n0.2, 1.0\n0.6, 3.0\n",
+         "[measured] curve: a strain of 0.6 is beyond the end of the path at 0.1; in per cent?"),
         ("waypoints = [{S11 = -1.0, S22 = 0.0, S12 = 0.0}]", "E11, S11\n0.01, 1.0\n",
          "[measured] curve: expected strains of the sign of the path, which ends at -1"),
         ("waypoints = [{S11 = 1.0}, {S11 = 0.0}]", "E11, S11\n0.01, 1.0\n",

@@ -5,12 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from support.base_case import BASE
+from unit.case.faulty_bonding import PATH, SOFTENING, of_type
 
 from feti_homog.report.text import study_tables
-from feti_homog.studies import estimation
+from feti_homog.studies import estimation, fit, pictures
 from feti_homog.studies.estimation import summarize
 from feti_homog.studies.fit_file import parse
+from feti_homog.studies.study import Evaluator
 
 TEXT = (
     "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 500.0}\n"
@@ -66,6 +69,28 @@ def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, 
     expected = [words] if is_fault else ["no measured value depends"] * stalls
     assert len(found["faults"]) == len(expected) and all(w in f for w, f in zip(expected, found["faults"], strict=True))
     assert ("interval?" in study_tables.fit_text(found)) == (is_fault and not stalls)
+    cure = "; teeth = 6 makes the curve a staircase: more teeth (softening_tolerance) make it smooth"
+    stepped = estimation.fit_document(fit.unknowns, fit.data, estimates, "teeth = 6")
+    assert stepped["faults"] == [f"{fault}{cure}" for fault in found["faults"]]
+
+
+@pytest.mark.parametrize("steps", ["teeth = 6", "softening_tolerance = 0.5", ""])
+def test_a_fault_of_a_fit_names_the_key_that_makes_steps(tmp_path, monkeypatch, steps):
+    """No measured value depends on the only unknown."""
+    unknown = TEXT.replace("C11", "peak_S11")
+    law = ["[interface]", *SOFTENING, "normal_toughness = 1.0", steps]
+    asked = parse(tomllib.loads(of_type("path", PATH, *law) + unknown), Path())
+    bounds, measured = (np.array([50.0]), np.array([500.0])), (np.array([150.0]), np.array([1.5]))
+    estimates = summarize(np.array([200.0]), measured[0], measured, np.array([[0.0]]), bounds)
+
+    def estimate(evaluations):
+        evaluations.answers[200.0,] = []
+        return estimates
+
+    monkeypatch.setattr(fit.Evaluations, "estimate", estimate)
+    monkeypatch.setattr(pictures, "draw_fit", lambda *_: None)
+    (fault,) = asked.answer(Evaluator(tmp_path, MPI.COMM_SELF, 1, False, True))["faults"]
+    assert (f"; {steps} makes the curve a staircase" in fault) == bool(steps) and "depends on it" in fault
 
 
 def test_every_printed_number_is_that_of_the_normal_equations():

@@ -172,6 +172,13 @@ def test_faults_of_a_sweep_are_reported(name):
     assert all(any(words in fault for fault in caught.value.faults) for words in expected), caught.value.faults
 
 
+def test_realisations_of_faulty_values_are_no_second_fault():
+    with pytest.raises(CaseError) as caught:
+        expanded("realisations = 2\ncell.fibre_fraction = {from = 0.1, to = 0.3}", RANDOM)
+    (fault,) = caught.value.faults
+    assert fault.startswith("[sweep] cell.fibre_fraction = ")
+
+
 def test_sweeps_that_contradict_their_case_are_refused(tmp_path):
     with pytest.raises(CaseError, match=r"excludes cell\.seed"):
         expanded("realisations = 2\ncell.seed = [1, 2]", RANDOM)
