@@ -107,7 +107,7 @@ WITHOUT_MEMORY = {
     "influence columns": (1, "feti.exact.reference_cell:ReferenceCell.columns"),
     "checkpoint": (0, "results.checkpoints:Checkpoint.write"),
     "table": (0, "results.result_json:write_csv"),
-    "picture": (0, "report.plots.figures:plot"),
+    "picture": (1, "report.plots.figures:draw"),
 }
 
 

@@ -161,7 +161,7 @@ def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path):
     """Its folder goes when pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
     case, log, out = case_file(tmp_path, ""), tmp_path / "logs", tmp_path / "out"
     log.mkdir()
-    hook = Hook("feti_homog.report.plots.figures:plot", f"os.rmdir({str(log)!r})")
+    hook = Hook("feti_homog.report.plots.figures:draw", f"os.rmdir({str(log)!r})", rank=0)
     job = hooked(2, [hook], "run", case, "--out", out, "-log_view", f":{log}/log.txt")
     assert job.returncode == 1 and "error: PETSc cannot end" in job.stderr
     assert json.loads((out / "result.json").read_text())["status"] == "done"
