@@ -71,8 +71,11 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
     first, second, edge = torus.sides
-    may_part = pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0
-    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[first] != torus.constituent[second])]])
+    pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
+    if len(bonded := np.flatnonzero(torus.debonded[edge] & (pair < 0))):
+        a, b = sorted(torus.mesh.phases[torus.mesh.phase[side[bonded[0]]]] for side in (first, second))
+        lines.append(f'the curve "debonded" of the mesh is bonded between {a} and {b}: no [[interface]] joins them')
+    ends = np.unique(torus.edge_ends[edge[(pair >= 0) & (torus.constituent[first] != torus.constituent[second])]])
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
     if counts := [f"at {mask.sum()} {kind}" for mask, kind in kinds if mask.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -214,3 +215,21 @@ def test_sides_without_images_do_not_exchange_phases(boundary):
     material = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
     document = {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
     assert "exchanged" not in describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF)
+
+
+def test_a_debonded_curve_between_phases_without_an_interface_is_remarked(tmp_path):
+    mesh = grid().with_curve(RIGHT_SIDE)
+    for tag in (11, 12):
+        mesh = mesh.with_element(tag, 2, 3, mesh.elements[tag][3])
+    replace(mesh, names=mesh.names | {3: "fibre:2"}).write(tmp_path / "cell.msh")
+    phase, springs = {"young": 1.0, "poisson": 0.3}, {"normal_stiffness": 1e3, "tangential_stiffness": 1e3}
+    document = {
+        "cell": {"geometry": "mesh", "file": "cell.msh"},
+        "material": {"matrix": phase, "fibre": phase, "fibre:2": phase},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "interface": [springs | {"between": ["fibre", "fibre:2"]}],
+    }
+    words = 'the curve "debonded" of the mesh is bonded between fibre and matrix: no [[interface]] joins them'
+    assert f"remark     {words}" in describe(Case.parse(document, tmp_path), MPI.COMM_SELF).splitlines()
+    document["interface"].append(springs | {"between": ["matrix", "fibre"]})
+    assert words not in describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
