@@ -124,7 +124,7 @@ class _Content:
                 raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
             if tag in self.triangles or tag in self.lines:
                 raise ValueError(f"element {tag} is there twice")
-            elements[tag] = nodes
+            elements[tag] = nodes if not kind.startswith("B33") else [nodes[0], *nodes[2:], nodes[1]]  # meshio's order
             if "ELSET" in block.parameters:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 

@@ -40,6 +40,13 @@ def test_lines_are_debonded_or_of_a_phase_by_their_set(tmp_path):
     assert read(path).remarks == ()
 
 
+@pytest.mark.parametrize(("kind", "nodes"), [("B22", "1, 5, 3"), ("B33H", "1, 3, 5"), ("B33", "1, 3")])
+def test_lines_of_three_nodes_end_where_abaqus_and_meshio_say(kind, nodes, tmp_path):
+    path = tmp_path / "lines.inp"
+    path.write_text(SQUARE + f"*NODE\n5, 0.5, 0.5\n*ELEMENT, TYPE={kind}, ELSET=debonded\n7, {nodes}\n")
+    assert abaqus_file.load(path).curves["debonded"].tolist() == [[1, 3]]
+
+
 def test_nodes_of_the_assembly_are_not_those_of_the_part(tmp_path):
     """A reference point has a number that a node of the part has too."""
     expected = read(write_inp(tmp_path / "one.inp", grid()))
