@@ -28,7 +28,7 @@ def table(source: Path) -> str:
     """
     fibres = read(source)
     if fibres.lacks_voids:
-        raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
+        raise CaseError(f"{source}: a table lacks voids of images and meshes; result.json lists the fibres by number")
     ellipses = fibres.ellipses
     with np.errstate(invalid="ignore"):  # frames are NaN for other shapes
         is_round = ellipses.are_round

@@ -159,7 +159,7 @@ def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
     (tmp_path / "case.toml").write_text(
         _toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh", "voids": True}))
     )
-    with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
+    with pytest.raises(CaseError, match=r"a table lacks voids of images and meshes; result\.json lists"):
         listed_fibres.table(tmp_path / "case.toml")
     assert fibre_statistics.pattern(tmp_path / "case.toml", None).count == 2
 
