@@ -120,16 +120,17 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
 
     Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with straight sides at
     voids, with fibres other than circles and ellipses, and for linear elements without interfaces.  For debonded
-    responses it is true only if elements are linear and the mesh is graded to tips (no `tip_size`, and no bonds break).
+    responses it is true only if elements are linear and the mesh is graded to tips: a generated mesh, without
+    `tip_size`, for an analysis in which no bonds break.
     """
-    lattice = cell.lattice
+    lattice, case = cell.lattice, cell.case
     pieces = (s.submesh for s in cell.subdomains)
     straight = any(bool((piece.at_void[piece.edge_class] & (piece.turns == 0)).any()) for piece in pieces)
     if not lattice.halvings or cell.summary.has_corners or cell.comm.allreduce(straight, MPI.LOR):
         return False
-    if not cell.case.interfaces:
+    if not case.interfaces:
         return lattice.order == 2  # with linear elements both parts of the error cancel too often
-    graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
+    graded = case.cell.tip_size is None and not (case.cell.has_own_mesh or case.section.breaks)
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
 
 

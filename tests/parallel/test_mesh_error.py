@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 from reference.closed_forms import cubic
 from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, ELASTIC, ENGINEERING_CONSTANTS, VOID
-from support.cases import FIBRE, MATRIX, make_case, solve
+from support.cases import FIBRE, MATRIX, case_of, make_case, solve
+from support.users_meshes import polar_cell
 
 from feti_homog import Case, run
 from feti_homog.fem.arc_error import ArcSides, arc_energy
@@ -168,6 +169,22 @@ def test_the_mesh_refined_less_tells_nearly_the_same_errors(comm, order, refine)
     assert np.corrcoef(*map(np.concatenate, parents))[0, 1] > 0.5
     np.testing.assert_array_equal(energy_errors(cell, responses).elements, (whole if order == 1 else nested).elements)
     cell.destroy()
+
+
+@pytest.mark.one_rank
+def test_tips_in_meshes_of_users_have_no_estimate_from_a_coarser_mesh(comm, shared_path):
+    """The error at tips is half of that on the coarser mesh, and the estimate nearly half the error."""
+    polar_cell((0.5, 0.5), 0.3, shared_path / "cell.msh", size=0.06)
+    arc, estimates, values = {"debonded": [{"fibre": 1, "angle": 60.0}], "contact": False}, [], []
+    for refine in (2, 3):
+        own = {"geometry": "mesh", "file": "cell.msh", "refine": refine}
+        cell, L, responses = solve(case_of(own, shared_path, interface=arc), comm)
+        estimates.append(np.diag(energy_errors(cell, responses).absolute))
+        values.append(np.diag(L))
+        cell.destroy()
+    errors = 2.0 * (values[0] - values[1])
+    assert (estimates[0] > 0.35 * errors).all() and (estimates[0] < errors).all()
+    assert (estimates[1] > 0.35 * errors / 2.0).all()
 
 
 def test_bodies_of_a_phase_together_have_the_errors_of_each():
