@@ -105,7 +105,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw; return their names in result.h5.
 
     A path gives the state at the peak (or the first), and the state in the valley after the peak (or the last with
-    tractions).  Other analyses give the middle one of the partly debonded states (or the last with tractions).
+    tractions).  Other analyses give the first partly debonded state, or the last with tractions; `angle` the middle one.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
@@ -114,7 +114,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
     worthwhile = [name for name in names if name in partly or (status[name] == drawn_cell.CLOSED).any()]
     last = (worthwhile or names)[-1]
     if not reported(document).is_followed:
-        return [(partly or [last])[len(partly) // 2]]
+        return [(partly or [last])[len(partly) // 2 if reported(document).name == "angle" else 0]]
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = landmarks.peak_of(document)
     before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
