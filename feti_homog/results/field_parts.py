@@ -94,22 +94,20 @@ def state_parts(
     """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
 
     `states` maps labels to responses: in the plane problem and, if there is one, in the axial problem; conduction takes
-    the place of the axial problem.  A problem without a response (None) has zero fields.  `load_factor` and `point` are
-    as in `StatePart`.  Raises ValueError if a state has no response.
+    the place of the axial problem.  A problem without a response (None) has zero fields; a state has at least one
+    response.  `load_factor` and `point` are as in `StatePart`.
     """
     axial_cell = cell.axial or cell
     for number, (label, responses) in enumerate(states.items()):
         plane, axial = (*responses, None)[:2]
-        response, stress = plane or axial, fields.stress[number]
-        if response is None:
-            raise ValueError("expected a response")
-        shares = [part.shares for part in (plane, axial) if part is not None and part.shares is not None]
+        present, stress = [part for part in responses if part is not None], fields.stress[number]
+        shares = [part.shares for part in present if part.shares is not None]
         errors = np.sum(shares or [np.full(stress.shape[1], np.nan)], axis=0)
         u = [x[:, number] for x in fields.displacement]
         problem = cell.solver.problem if cell.solver.problem.turns else GENERALIZED
         in_plane = recovered_fields.nodal_fields(cell, plane, u[0], problem)
         common: dict[str, Any] = {"load_factor": load_factor, "point": point, "label": label}
-        energy = sum(2 * part.stored for part in responses if part is not None)  # E . Sigma
+        energy = sum(2 * part.stored for part in present)  # E . Sigma
         common["mesh_error"] = (errors / (energy if energy > 0 else 1.0)).astype(np.float32)
         common["stress_33"] = stress[2]
         common["stress"] = stress[voigt.IN_PLANE].T
@@ -118,7 +116,7 @@ def state_parts(
             rules = np.reshape([laws.out_of_plane(law, cell.case.analysis.plane)[0] for law in laws_of], (-1, 3))
             rules = np.repeat(rules, [len(s.mesh.triangles) for s in cell.parts], axis=0)  # a row for each element
             common["stress_33"] = np.einsum("ev,ev->e", common["stress"], rules)
-            common |= _at_nodes(cell, response, in_plane)
+            common |= _at_nodes(cell, present[0], in_plane)
             yield StatePart(strain=plane.strain, stress_mean=plane.stress, **common)
             continue
         along = recovered_fields.nodal_fields(axial_cell, axial, u[-1], axial_cell.solver.problem)
@@ -131,7 +129,7 @@ def state_parts(
             axial_traction=along.traction[:, 0],
             axial_jump=along.jump[:, 0],
             **common,
-            **_at_nodes(cell, response, in_plane, along),
+            **_at_nodes(cell, present[0], in_plane, along),
         )
 
 

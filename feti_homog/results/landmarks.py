@@ -93,7 +93,7 @@ def bond_of(peak: path_curves.Document, title: str = "") -> str:
     """Describe the bond of a landmark by fibre and direction, or "" if unknown; `title` begins its keys in `peak`."""
     if peak.get(f"{title}fibre") is None:
         return ""
-    return f"fibre {peak[f'{title}fibre']} at {peak[f'{title}angle'] + 0.0:.4g} degrees"
+    return f"fibre {peak[f'{title}fibre']} at {round(peak[f'{title}angle'], 3) + 0.0:.4g} degrees"
 
 
 def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:

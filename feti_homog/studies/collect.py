@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.report.text import constant_tables, point_tables, tables
-from feti_homog.results import atomic, result_json
+from feti_homog.results import atomic, landmarks, result_json
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.predictions import responses
@@ -43,6 +43,10 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
     failed = [(e, s) for e, s in zip(index.entries, states, strict=True) if s.status in case_folders.WITHOUT_RESULT]
     lines = [*case_folders.failure_lines(failed, index.stress_unit), *means(table)]
+    peaks = [landmarks.peak_of(document) for document in table.finished if "path" in document]
+    rising = sum("stress_left" not in peak and any(key.startswith("first_") for key in peak) for peak in peaks)
+    of_paths = f"remark: {rising} of {len(peaks)} paths end before their stress falls: load them further for a peak"
+    lines += [of_paths] if rising else []
     lines += case_folders.note_lines(index.entries, states)
     rows = zip(table.folder, table.status, table.reason, strict=True)
     begun = [f"  {folder}  {status}; {reason}" for folder, status, reason in rows if status in case_folders.BEGUN]

@@ -105,7 +105,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw; return their names in result.h5.
 
     A path gives the state at the peak (or the first), and the state in the valley after the peak (or the last with
-    tractions).  Other analyses give the first partly debonded state, or the last with tractions; `angle` the middle one.
+    tractions).  Other analyses give the first partly debonded state, or the last with tractions; angles the middle one.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
