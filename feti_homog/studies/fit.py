@@ -170,7 +170,7 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Return the estimates from the start; after a misfit or CaseError, from the best of `STARTS`.  On rank 0."""
+        """Return the estimates from the start; after a poor fit or CaseError, from the best of `STARTS`.  On rank 0."""
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
@@ -187,10 +187,10 @@ class Evaluations:
 
         with suppress(CaseError):
             estimates = search(start)
-        if estimates is not None and not estimates.misfits:
+        if estimates is not None and (estimates.chance is None or estimates.chance > 1.0 - estimation.CONFIDENCE):
             return estimates
         if not self.evaluator.quiet:
-            standard_streams.say("remark: the search from the start fails; the next begins at the best further point:")
+            standard_streams.say("remark: a poor fit, or none, from this start; the next is the best further point:")
         box = [Axis(path, ends=(a, b), log=a > 0.0) for path, a, b in zip(self.fit.paths, low, high, strict=True)]
         for point in sampled_points(box, sections.SweepSection(samples=STARTS - 1)):
             with suppress(CaseError, ConvergenceError):

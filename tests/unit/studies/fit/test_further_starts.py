@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.stats import chi2
 
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.studies import fit_file
@@ -38,7 +39,7 @@ class OfBars(Evaluations):
         return [({"case": {"analysis": {"type": "path"}, "interface": []}, "path": [{}]}, bar(x)) for _, x in places]
 
 
-def evaluations(folder: Path, monkeypatch: pytest.MonkeyPatch, start: tuple[float, float]) -> OfBars:
+def evaluations(folder: Path, monkeypatch: pytest.MonkeyPatch, start: tuple[float, float], std: float = 0.3) -> OfBars:
     rows = "".join(f"{strain}, {stress}\n" for strain, stress in zip(STRAINS, bar(TRUTH), strict=True))
     (folder / "curve.csv").write_text(f"E11, S11\n{rows}")
     document = {
@@ -51,7 +52,7 @@ def evaluations(folder: Path, monkeypatch: pytest.MonkeyPatch, start: tuple[floa
             "interface.normal_strength": {"start": start[0], "lower": 5.0, "upper": 150.0},
             "interface.tangential_strength": {"start": start[1], "lower": 0.05, "upper": 2.0},
         },
-        "measured": {"curve": {"file": str(folder / "curve.csv"), "std": 0.3}},
+        "measured": {"curve": {"file": str(folder / "curve.csv"), "std": std}},
     }
     monkeypatch.setattr("feti_homog.studies.fit.exact_derivatives", lambda *_: None)
     evaluator = SimpleNamespace(comm=MPI.COMM_SELF, quiet=True)
@@ -63,6 +64,19 @@ def test_far_starts_end_at_the_truth(tmp_path, monkeypatch, start):
     found = evaluations(tmp_path, monkeypatch, start).estimate()
     assert found is not None and not found.misfits
     assert found.x == pytest.approx(TRUTH, rel=0.02)
+
+
+@pytest.mark.parametrize("chance", [0.002, 0.04])
+def test_false_minima_with_possible_residuals_are_left(tmp_path, monkeypatch, chance):
+    """`chance` is the probability of larger residuals than those at the minimum near the start."""
+    start = (140.0, 0.06)
+    with monkeypatch.context() as without:
+        without.setattr("feti_homog.studies.fit.sampled_points", lambda *_: [])
+        false = evaluations(tmp_path, monkeypatch, start).estimate()
+    assert false is not None and false.x != pytest.approx(TRUTH, rel=0.1)
+    std = 0.3 * np.sqrt(false.residuals @ false.residuals / chi2.isf(chance, len(STRAINS) - false.rank))
+    found = evaluations(tmp_path, monkeypatch, start, std).estimate()
+    assert found is not None and found.chance is not None and found.chance > 0.5 > 10 * chance
 
 
 def test_a_good_start_needs_no_others(tmp_path, monkeypatch):
