@@ -143,13 +143,12 @@ def debonded(
     """Return the mask (k,) of nodes within debonded arcs.
 
     Nodes lie on fibres (k,), numbered from 1, in directions `angle` (k,); `moved` are the tips that the mesh has moved.
-    Arcs without an angle take `opening`.  Raises ValueError if such an arc has no opening.
+    Arcs without an angle take `opening`, which must then be given.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:
         width = opening if arc.angle is None else arc.angle
-        if width is None:
-            raise ValueError("an arc without an angle needs an opening")
+        assert width is not None
         ends = np.empty((2, len(fibre)))  # of the arc at each node, not reduced to [0, 360)
         for end, half in zip(ends, (-width / 2, width / 2), strict=True):
             end[:], tip = arc.centre + half, _end(arc, half)

@@ -10,7 +10,7 @@ from feti_homog.case import Case, bond_laws, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
-from feti_homog.results import path_curves
+from feti_homog.results import landmarks, path_curves
 from feti_homog.schema import wording
 from feti_homog.studies.outputs import CONDUCTIVITIES, outputs
 from feti_homog.typing import Float
@@ -125,10 +125,13 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
     """Return the computed values (m,) at the data.  Raises CaseError if a value, or a curve at a strain, is missing."""
-    values = _values(document)
+    values, ways = _values(document), {"onset": "; no bond breaks"}
+    if "path" in document and "stress_left" not in landmarks.peak_of(document):
+        values = {name: value for name, value in values.items() if not name.startswith("peak_")}
+        ways["peak"] = "; the path ends before its stress falls: load it further"
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:
-        reasons = ("; no bond breaks" if name.startswith("onset_") else "" for name in missing)
+        reasons = (ways.get(name.partition("_")[0], "") for name in missing)
         lines = (f"[measured] {name}: this result has no such value" for name in missing)
         raise CaseError(*(f"{line}{reason}" for line, reason in zip(lines, reasons, strict=True)))
     return np.array([values[d.name] if d.strain is None else _on_curve(document, d)[0] for d in data])

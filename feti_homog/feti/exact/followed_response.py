@@ -110,10 +110,9 @@ class FollowedResponse:
     def blocks(self, pairs: Int) -> Float:
         """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
 
-        Both rows of a pair belong to one rank; their columns count as used.  Raises ValueError if a row has no column.
+        Both rows of a pair belong to one rank; they have columns, which count as used.
         """
-        if len(self.lacking(pairs)):
-            raise ValueError("blocks of the response: expected rows with columns")
+        assert not len(self.lacking(pairs))
         places, at, n = pairs - self._first, self._slot[pairs], self._count
         self._used[at] = self._now
         mine = ((places >= 0) & (places < len(self._buffer))).all(axis=1)

@@ -47,8 +47,7 @@ class Preconditioner(Protocol):
     def soften(self, more: Float) -> None:
         """Add `more` (owned rows,) to the intact spring compliance, from the next `activate` on.
 
-        Raises:
-            ValueError: the preconditioner is made for springs of constant compliance.
+        Raises ValueError if the preconditioner is made for springs of constant compliance.
         """
         raise ValueError("springs soften; expected constant compliance, as the preconditioner was set up")
 

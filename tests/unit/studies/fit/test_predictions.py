@@ -27,6 +27,8 @@ def test_a_path_without_a_break_has_no_onset():
         predicted(document, [data["onset_S11"]])
     assert not [name for name in responses(document) if name.startswith("onset_")]
     for name in ("peak_S11", "peak_E11"):
+        with pytest.raises(CaseError, match=rf"{name}: .*; the path ends before its stress falls: load it further"):
+            predicted(document, [data[name]])
         assert exact_derivatives(document, [data[name]], "interface.normal_strength") is None
 
 
@@ -44,6 +46,8 @@ def test_the_only_strength_scales_the_load_of_onset_and_one_of_two_does_not():
     slopes = exact_derivatives(alone, data, "interface.normal_strength")
     assert slopes == pytest.approx(one) and 2.0 * slopes == pytest.approx(twice)
     assert exact_derivatives(alone, data, "interface.tangential_strength") is None
+    peak = [Datum(0, "peak_S11", 1.0, 0.1)]
+    assert predicted(alone, peak) == pytest.approx(responses(alone)["peak_S11"])
     both = broken(normal_strength=1.0, tangential_strength=0.1)
     assert (predicted(both, data) < 0.9 * one).all()
     for name in ("normal_strength", "tangential_strength"):
