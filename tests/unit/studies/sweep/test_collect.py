@@ -115,19 +115,6 @@ def test_each_case_is_listed_by_its_status_and_done_ones_alone_count(tmp_path, m
     assert known == ["done", "running", "interrupted"] and table.statistics["peak_S11"].count == 1.0
 
 
-@pytest.mark.parametrize("rising", [0, 1, 2])
-def test_paths_whose_stress_does_not_fall_are_counted(tmp_path, monkeypatch, rising):
-    falling = path_document(2, 0.0)
-    short = falling | {"path": falling["path"][:1]}
-    entries = tuple(case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k in (1, 2))
-    documents = [*[short] * rising, *[falling] * (2 - rising)]
-    found = [case_folders.CaseState(case_folders.Status.DONE, "", document) for document in documents]
-    index = case_folders.SweepIndex("test", "GPa", entries)
-    monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
-    remark = f"remark: {rising} of 2 paths end before their stress falls: load them further for a peak"
-    assert collect.collect(tmp_path, pictures=False).count(remark) == (rising > 0)
-
-
 def test_notes_that_differ_in_numbers_alone_are_printed_once(tmp_path, monkeypatch):
     """Each with its first case and the number of cases; warnings come first."""
     notes = [["[cell] order = 1: 2.6% less", "utilisation"], ["[cell] order = 1: 0.9% less"], None]
