@@ -16,7 +16,7 @@ from feti_homog.typing import Float, Int
 # Weight of the elements around the neighbours of a boundary vertex, by element order.  The values are measured with
 # `scripts/measure_mesh_error.py` over all its cells.
 NEIGHBOURS = {1: 0.1, 2: 0.001}
-# Term on the unit diagonal of the scaled moments: where all points lie on a line, a fit does not vary across the line.
+# Term on the unit diagonal of the scaled moments of slopes: where all points lie on a line, a fit does not vary across.
 RIDGE = 1e-9
 # Length of the mean side normal below which a vertex has no normal, for example in a cusp where two fibres touch.
 NO_NORMAL = 0.1
@@ -89,13 +89,12 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
     moments = np.stack([np.bincount(at, part.ravel()).astype(float) for part in parts])
     moments += neighbours.shared_moments(moments)
-    # The first row of the inverse of each normalized symmetric matrix.
+    # The first row of the inverse of each normalized symmetric matrix, by moments about the mean position.
     scale = 1 / np.sqrt(moments[[0, 3, 5]])
-    xx = yy = 1.0 + RIDGE
     mx, my, xy = (moments[k] * scale[i] * scale[j] for k, i, j in ((1, 0, 1), (2, 0, 2), (4, 1, 2)))
-    cofactors = np.stack([xx * yy - xy * xy, xy * my - mx * yy, mx * xy - xx * my])
-    determinant = (1.0 + RIDGE) * cofactors[0] + mx * cofactors[1] + my * cofactors[2]
-    first = cofactors * scale * (scale[0] / determinant)
+    cxx, cyy, cxy = 1.0 + RIDGE - mx * mx, 1.0 + RIDGE - my * my, xy - mx * my
+    gx, gy = np.stack([my * cxy - mx * cyy, mx * cxy - my * cxx]) / (cxx * cyy - cxy * cxy)
+    first = np.stack([1.0 - mx * gx - my * gy, gx, gy]) * scale * scale[0]
     means = sum(np.take(row, vertices) * part for row, part in zip(first, basis, strict=True))
     result = csc_matrix((means.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
@@ -137,9 +136,9 @@ def gathered(place: Int, values: Float, size: int) -> Float:
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """Solve moments a = sums for coefficients a (n, p, k); moments (n, p, p) get RIDGE, sums are (n, p, k)."""
+    """Solve moments a = sums for coefficients a (n, p, k); slopes get RIDGE, moments are (n, p, p), sums (n, p, k)."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
-    normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
+    normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.diag(np.arange(moments.shape[1]) > 0)
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))
 
 

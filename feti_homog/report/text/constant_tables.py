@@ -240,9 +240,9 @@ def sensitivities(document: Document) -> list[Table]:
     values, slopes, shares = [section["constant_values"][k] for k in at], list[list[Any]](), list[list[Any]]()
     for j, (name, parameter) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
         row = [section["derivatives"][k][j] for k in at]
-        pairs = zip(row, values, strict=True)
-        slopes.append([name, *row])
-        shares.append([name, *(without_noise(slope * parameter / c) if c else UNKNOWN for slope, c in pairs)])
+        changes = [without_noise(slope * parameter / c) if c else UNKNOWN for slope, c in zip(row, values, strict=True)]
+        slopes.append([name, *(f"{slope if change else 0.0:.3g}" for slope, change in zip(row, changes, strict=True))])
+        shares.append([name, *changes])
     text = "Elasticities, the relative change of a constant by that of a parameter"
     text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
     names = [STIFF[2] if constants[k] == "C33" and "C66" not in constants else constants[k] for k in at]
@@ -267,5 +267,6 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Return the constants that tables show.  For a load, or for secants in space, these are the first MOST."""
-    return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else list(names[:MOST])
+    """Return the constants that tables show: of a load, and of secants in space, MOST, the diagonal entries first."""
+    chosen = sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]
+    return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else chosen

@@ -62,7 +62,7 @@ def scatter_text(document: Document) -> str:
     heads["+- mesh"] = "mesh_error"
     labels = [number["name"].removeprefix("material.") for number in inputs]
     names = [result["name"] for result in document["results"]]
-    listed = constant_tables.shown(names) if "C11" in names else names
+    listed = constant_tables.shown(names) if "E1" in names else names
     kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
     for kind, result in zip(kinds, document["results"], strict=True):
         sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])

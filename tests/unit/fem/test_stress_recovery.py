@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from feti_homog.fem import local_fits
 from feti_homog.fem.local_fits import NEIGHBOURS, KnownTractions
 from feti_homog.fem.problem import AXIAL, PLANE
 from feti_homog.fem.stress_recovery import LINEAR_AT_ONCE, RecoveredStress
@@ -89,3 +90,18 @@ def test_a_vertex_at_which_normals_cancel_has_no_tractions():
     known = KnownTractions.at(np.array([2, 5]), normals, np.ones((2, 2, 1)))
     np.testing.assert_array_equal(known.node, [5])
     np.testing.assert_array_equal(known.normal, [[0.0, 1.0]])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_uniform_stresses_are_recovered_where_all_centres_lie_on_a_line_beside_a_vertex(order):
+    """As in a layer of one element between periodic sides; no slope across the line is known."""
+    away = np.array([[0.05, -0.1], [0.05, 0.02], [0.05, 0.1]])
+    if order == 1:
+        vertices, spread = np.array([[0, 0, 0], [1, 2, 3], [4, 5, 6]]), np.full((2, 3, 3), 0.07)
+        spread[:, 0] = away.T
+        none = local_fits.PatchNeighbours(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
+        found = local_fits.linear_values(vertices, spread, np.arange(1.0, 4.0), np.full((3, 1), 7.0), none)[:, 0]
+    else:
+        basis = local_fits.polynomials(away, 2)
+        found = local_fits.fitted((basis.T @ basis)[None], 7.0 * basis.sum(axis=0)[None, :, None])[0, :1, 0]
+    assert found == pytest.approx(7.0, rel=1e-6)
