@@ -69,11 +69,8 @@ class ScatterStudy(Study):
 
         def without_derivatives() -> list[str]:
             data = _data(means)
-            return [
-                name
-                for name in self.uncertainty.std
-                if any(exact_derivatives(document, data, name) is None for document in means)
-            ]
+            stds = self.uncertainty.std
+            return [name for name in stds if any(exact_derivatives(document, data, name) is None for document in means)]
 
         inexact = mpi_errors.on_root(comm, without_derivatives)
         ends = evaluator.results("differences", mpi_errors.on_root(comm, self.differing, inexact)) if inexact else []
@@ -179,11 +176,14 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return a placeholder datum for each number that all results have; paths give load factors and peak components."""
+    """Return placeholder data, for paths load factors and peaks; CaseError if only some results have these numbers."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
         peak = landmarks.peak_of(documents[0])
+        pairs = zip(named, map(landmarks.peak_of, documents), strict=True)
+        if len({("onset_load_factor" in values, "stress_left" in of) for values, of in pairs}) > 1:
+            raise CaseError("[path]: bonds break, or the stress falls, in some runs and not in others; load it further")
         names = [n for n in names if n.partition("_")[2] in ("load_factor", peak["stress_name"], peak["strain_name"])]
     return [Datum(0, name, 0.0, 1.0) for name in names]
 

@@ -111,3 +111,19 @@ def test_faults_have_their_line(changes, line):
     with pytest.raises(CaseError) as error:
         uncertainty.parse(case | changes, Path())
     assert error.value.faults[0].startswith(line), error.value.faults
+
+
+@pytest.mark.one_rank
+def test_scatter_of_paths_of_which_some_break_no_bond_is_refused(comm, shared_path):
+    case = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.4, "order": 1},
+        "material": MATERIAL,
+        "analysis": {"type": "path", "plane": "strain"},
+        "path": {"to": {"S11": 1.0}},
+        "interface": {"normal_strength": {"mean": 0.8, "cv": 0.1}, "tangential_strength": 100.0},
+    }
+    onset = uncertainty.parse(case, Path()).run(shared_path / "all", comm, comm.size, False, True)
+    found = next(each["value"] for each in onset["results"] if each["name"] == "onset_load_factor")
+    case["path"]["to"]["S11"] = 1.02 * found
+    with pytest.raises(CaseError, match=r"^\[path\]: bonds break, or the stress falls, in some runs"):
+        uncertainty.parse(case, Path()).run(shared_path / "some", comm, comm.size, False, True)

@@ -5,6 +5,7 @@ import re
 import pytest
 from support.sweep_tables import path_document
 
+from feti_homog.report.text import constant_tables
 from feti_homog.report.text.study_tables import scatter_text
 from feti_homog.studies import uncertainty
 
@@ -75,3 +76,34 @@ def test_a_path_has_its_onset_and_peak_in_the_leading_component(leading):
     component = f"{leading + 1}{leading + 1}"
     names = [f"{mark}_{kind}{component}" for mark in ("onset", "peak") for kind in "ES"]
     assert {datum.name for datum in uncertainty._data([document] * 2)} == {"onset_load_factor", *names}
+
+
+SECANTS = [f"C{i}{j}" for i in range(1, 7) for j in range(i, 7)]
+
+
+def test_all_secants_in_space_are_listed():
+    scatter = {
+        "value": 3.0,
+        "std_inputs": 0.3,
+        "mesh_error": None,
+        "std": 0.3,
+        "shares": [1.0],
+        "derivative_errors": None,
+    }
+    results = [scatter | {"name": name} for name in SECANTS]
+    parameters = [{"name": "material.fibre.E_axial", "by": "derivatives"}]
+    text = scatter_text({"cells": 1, "parameters": parameters, "results": results})
+    assert [name for name in SECANTS if f"  {name} " in text] == SECANTS
+
+
+def test_derivatives_of_secants_and_of_expansions_in_any_unit_are_printed():
+    """The diagonal entries come first; a small derivative with a large elasticity is no noise, a zero stays a zero."""
+    small = {
+        "parameters": ["material.matrix.young", "material.fibre.young"], "parameter_values": [3e9, 7e10],
+        "constants": ["expansion_1"], "constant_values": [5e-5], "derivatives": [[1.9e-16, 1e-30]],
+    }  # fmt: skip
+    _, slopes = constant_tables.sensitivities({"sensitivities": small})
+    assert "1.9e-16" in slopes.html and ">0<" in slopes.html
+    secants = small | {"constants": SECANTS, "constant_values": [1.0] * 21, "derivatives": [[1.0, 1.0]] * 21}
+    heads = constant_tables.sensitivities({"sensitivities": secants})[0].lines[1].split()
+    assert heads == ["C11", "C22", "C33", "C44", "C55", "C66", "C12", "C13", "C14"]
