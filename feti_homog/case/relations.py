@@ -115,9 +115,9 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
             if value != common:
-                expected = f"expected {_written(common)}, as of [interface 1]"
+                expected = f"expected {_written(common)}, as of [interface 1]: all interfaces agree in it"
                 word = "law" if name == "criterion" and name not in tables[number] else name
-                reader.faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
+                reader.faults.append(f"[{label}] {word} = {_written(value)}: {expected}; pairs without one stay bonded")
     for (label, interface), table in zip(labelled(interfaces), tables, strict=True):
         reader.faults += [f"[{label}] {line}" for line in _faults_within(interface, table)]
     return tuple(interfaces)
