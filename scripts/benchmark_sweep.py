@@ -1,8 +1,7 @@
-"""Time a sweep on one rank, the same sweep with one case per rank, and CHOLMOD on the meshes of the sweep.
+"""Time three whole commands in turns: a sweep on one rank, with one case per rank, and by CHOLMOD.
 
-All three are whole commands, start-up included, run in turns.
-The loop only meshes, assembles, factors and solves: it writes nothing and estimates no errors. Processor
-time, which other programs change least, is summed over all ranks.
+The times include the start. The loop of CHOLMOD only meshes, assembles, factors and solves: it writes nothing and
+estimates no errors. Processor time, which other programs change least, is summed over all ranks.
 """
 
 import argparse

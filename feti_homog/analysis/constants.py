@@ -119,16 +119,16 @@ def response_errors(
 ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
     """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
 
-    Returns the errors of each group, [] if `mesh_error = false`, and one list of all responses, with estimated shares.
+    Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
     """
+    if context.states.is_recording or context.case.output.sensitivities:
+        groups = [*map(recovered_fields.with_displacements, (p.cell for p in context.loads.problems), groups)]
     if not context.case.output.mesh_error:
         return [], [*chain(*groups)]
     from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
     errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
-    for problem, responses in zip(context.loads.problems, groups, strict=False):
-        # Estimate and record share one recovery.
-        group = recovered_fields.recovered(problem.cell, responses) if context.states.is_recording else responses
+    for problem, group in zip(context.loads.problems, groups, strict=False):
         touches = problem.interface.contact and any(response.debonded for response in group)
         errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
         estimated += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]

@@ -46,7 +46,7 @@ class Response:
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) bond damage, 0 intact to 1 broken.
         shares: (m,) contributions of this rank's elements to the estimated error of E . Sigma; None if not estimated.
-        inside: (dofs,) u* in this rank's parts; (0,) before `recovered_fields.recovered`.
+        inside: (dofs,) u* in this rank's parts; (0,) before `recovered_fields.with_displacements`.
     """
 
     strain: Float

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from feti_homog.fem import arc_error, local_fits, stress_recovery
 from feti_homog.feti.decomposition import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.recovered_fields import recovered
+from feti_homog.homogenization.recovered_fields import with_displacements
 from feti_homog.homogenization.uniform_parts import NONE, UniformPart, groups, locks, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED
@@ -154,7 +154,7 @@ def _recovered(
             position[interior.fixed] = interior.place
             solved.append((interior.members, interior.mesh, displacement, position))
     else:
-        inside = np.stack([response.inside for response in recovered(cell, responses)], axis=1)
+        inside = np.stack([response.inside for response in with_displacements(cell, responses)], axis=1)
         numbered, position = np.arange(len(inside)) if across else boundary.local_dofs, np.full(len(inside), NONE)
         position[numbered] = np.arange(len(numbered))
         for group in groups(cell.parts, lattice):

@@ -60,7 +60,7 @@ class NodalFields:
     jump: Float
 
 
-def recovered(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
+def with_displacements(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
     """Return the responses with u* inside the subdomains.  Collective."""
     if all(len(response.inside) == cell.offsets[-1] for response in responses):
         return list(responses)
@@ -133,7 +133,7 @@ def _stresses(
     errors; they are 0 in states without a response.
     """
     at = [number for number, response in enumerate(responses) if response is not None]
-    present = recovered(cell, [response for response in responses if response is not None])
+    present = with_displacements(cell, [response for response in responses if response is not None])
     out[:, at] = np.stack([response.inside for response in present], axis=1)
     loads = np.stack([response.all_loads for response in present], axis=1)[: len(cell.solver.problem.loads)]
     for part, displacement in cell.by_part(out[:, at]):

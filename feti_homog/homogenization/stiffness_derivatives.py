@@ -24,7 +24,7 @@ from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
-from feti_homog.homogenization.recovered_fields import recovered
+from feti_homog.homogenization.recovered_fields import with_displacements
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
@@ -101,7 +101,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     """
     problem = cell.solver.problem
     loads = np.stack([response.all_loads for response in responses], axis=1)[: len(problem.loads)]
-    inside = np.stack([response.inside for response in recovered(cell, responses)], axis=1)
+    inside = np.stack([response.inside for response in with_displacements(cell, responses)], axis=1)
     m, (v, k) = problem.strains, loads.shape
     # T maps [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))

@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """Round fibres of one phase and of equal radii; `springs` is None for perfect bonding."""
+    """Round fibres with one phase and one radius; bonding is perfect without `springs`."""
 
     fraction: float
     constants: TransverseIsotropy

@@ -69,7 +69,7 @@ def test_a_square_lattice_along_its_diagonal_has_the_turned_stiffness(comm):
 
 @pytest.mark.quick
 def test_two_phases_of_one_material_are_one_phase(comm):
-    """Equal radii make numbers of fibres proportional to fractions; the centres agree with a cell of one phase."""
+    """Fibres of equal radii share the number 8 in proportion to their fractions, at the centres of the plain cell."""
     _, plain = stiffness(comm, MIXED | {"fibre_fraction": 0.4, "fibres": 8})
     mix = {"mix": {"glass": 0.1, "carbon": 0.3}, "fibres": 8}
     assert relative_error(stiffness(comm, MIXED | mix, glass=FIBRE, carbon=FIBRE)[1], plain) < 1e-9

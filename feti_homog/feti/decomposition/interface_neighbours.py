@@ -116,7 +116,7 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Extend global rows (k,) to at least `enough` rows at the same and adjacent nodes; return all rows, sorted.
+        """Return global rows (k,) and rows at nodes around, at least `enough` in all, in ascending order.
 
         `choose` selects new rows from candidates.  With no further adjacent node, the result may have fewer rows.
         """

@@ -53,7 +53,7 @@ def read(
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
     numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
-    relative to the width, nodes first move onto sides (`snapped`). A remark tells of a lower `order` in the case.
+    relative to the width, nodes first move onto sides (`snapped`). A lower `order` in the case is remarked.
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,

@@ -55,11 +55,11 @@ class ConvexCurves:
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Return the curves followed by other curves; all cores must have the same number of corners."""
+        """Append other curves.  The cores of all curves must have equally many corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
-        """Apply a function to every field, together with the same field of other curves."""
+        """Apply a function, field by field, to this object and other curves."""
         names = [field.name for field in fields(self)]
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 

@@ -94,7 +94,7 @@ def test_a_vertex_at_which_normals_cancel_has_no_tractions():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_uniform_stresses_are_recovered_where_all_centres_lie_on_a_line_beside_a_vertex(order):
-    """As in a layer of one element between periodic sides; no slope across the line is known."""
+    """Such lines occur in layers one element wide; they determine no slope across."""
     away = np.array([[0.05, -0.1], [0.05, 0.02], [0.05, 0.1]])
     if order == 1:
         vertices, spread = np.array([[0, 0, 0], [1, 2, 3], [4, 5, 6]]), np.full((2, 3, 3), 0.07)

@@ -68,7 +68,7 @@ def test_far_starts_end_at_the_truth(tmp_path, monkeypatch, start):
 
 @pytest.mark.parametrize("chance", [0.002, 0.04])
 def test_false_minima_with_possible_residuals_are_left(tmp_path, monkeypatch, chance):
-    """`chance` is the probability of larger residuals than those at the minimum near the start."""
+    """The standard deviation gives the false minimum this `chance` under a correct model."""
     start = (140.0, 0.06)
     with monkeypatch.context() as without:
         without.setattr("feti_homog.studies.fit.sampled_points", lambda *_: [])
