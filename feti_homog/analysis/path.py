@@ -19,7 +19,7 @@ from feti_homog.interface.friction import coulomb_faces, sliding_cell
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
-from feti_homog.results import landmarks, path_curves
+from feti_homog.results import checkpoints, landmarks, path_curves
 from feti_homog.system.runtime import records, standard_streams
 
 OF_FIBRES = ("debonded_length", "debonding_angle")  # lists over fibres, kept at points whose fields are kept
@@ -32,7 +32,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     `path` has each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and `resumed` the
     count of restored points; new converged points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
     """
-    path, law = context.case.section, criterion_of(context.cell, grows=True)
+    path, law, cell = context.case.section, criterion_of(context.cell, grows=True), context.loads.interfaces
     assert isinstance(path, load_sections.LoadPath)
     check_accuracy(context)
     count = min(path_events.resumable(context), path.max_events)
@@ -41,28 +41,19 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line reports the fall
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
-            place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' * bool(before)}"
-            if before is not None:
-                work.resume_from(*before[:2], point)
-            else:
+            if before is None:
                 work.arrive(point)
-            bonds.append(most_utilised_bond(context, law, point) if before is None else before[2])
+                bonds.append(most_utilised_bond(context, law, point))
+            else:
+                work.resume_from(*before[:2], point)
+                bonds.append(before[2])
             entries.append(entry := _entry(context, law, point, responses, work))
             if before is None and point.state.converged:
-                cell = context.loads.interfaces
                 event = path_events.stored(point, bonds[-1], responses, work, cell, _without_lists(entry))
-                context.checkpoint.write(number, *event)
-                line = (
-                    f"{number + 1} points kept in {context.directory}: plot shows them; run --resume or a study goes on"
-                )
-                standard_streams.remarks[:] = [line] * (context.directory is not None)
-            for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
-                faults = len(context.checks.faults)
-                line = context.checks.record(f"{_label(path, number)} {place}{problem}", response)
-                context.log(line)
-                if number == 0 or len(context.checks.faults) > faults:
-                    context.progress.say(line)
-            points = f"{len(entries)} {path.method.removesuffix('s' * (len(entries) == 1))}"
+                _keep(context, number, event)
+            place = f"at {point.load_factor:.6f}, {responses[0].leading}{', from the checkpoint' if before else ''}"
+            _record_checks(context, f"{_label(path, number)} {place}", responses, is_first=number == 0)
+            points = f"{len(entries)} {path.method.removesuffix('s') if len(entries) == 1 else path.method}"
             counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
             if (d := law.damage(point.state.bonds)) is not None:
                 counts += f", {context.cell.comm.allreduce(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
@@ -86,6 +77,27 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         return {"resumed": count, "path": ()}
     context.progress.say(f"  {points} in {context.events}")
     return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
+
+
+def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], checkpoints.Arrays]) -> None:
+    """Write the event of point `number` to the checkpoint, and name its use after an interruption.  Collective."""
+    context.checkpoint.write(number, *event)
+    if context.directory is not None:
+        folder = context.directory
+        line = f"{number + 1} points are in {folder}: `plot {folder}` draws them; to go on, add --resume to `run`"
+        standard_streams.remarks[:] = [f"{line}; a study goes on by itself"]
+
+
+def _record_checks(
+    context: AnalysisContext, place: str, responses: Sequence[averaging.Response], is_first: bool
+) -> None:
+    """Record the checks of the responses at one point; print new faults and the line of the first point."""
+    for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
+        faults = len(context.checks.faults)
+        line = context.checks.record(f"{place}{problem}", response)
+        context.log(line)
+        if is_first or len(context.checks.faults) > faults:
+            context.progress.say(line)
 
 
 def _points(

@@ -175,7 +175,7 @@ def test_an_interrupted_path_says_what_is_kept(tmp_path):
         assert job.reported() == "0 here"
         job.process.terminate()
         ended = job.ended()
-    line = f"2 points kept in {out}: plot shows them; run --resume or a study goes on"
+    line = f"2 points are in {out}: `plot {out}` draws them; to go on, add --resume to `run`; a study goes on by itself"
     assert ended.stderr == f"interrupted by SIGTERM\n{line}\n" and events.count(out) == 2
 
 
