@@ -180,7 +180,8 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
-    faults += ["PETSC_OPTIONS_YAML: expected PETSC_OPTIONS in its place"] * ("PETSC_OPTIONS_YAML" in os.environ)
+    if "PETSC_OPTIONS_YAML" in os.environ:
+        faults.append("PETSC_OPTIONS_YAML: expected PETSC_OPTIONS in its place")
     if faults := [*faults, *option_values.faulty_values(options), *option_table.unknown_options(options)]:
         raise CaseError(*faults)
     os.environ["PETSC_OPTIONS"] = "-skip_petscrc"  # gmsh starts a PETSc of its own

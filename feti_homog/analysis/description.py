@@ -31,7 +31,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         loads = comm.gather((len(part.submeshes.index), nodes)) or []
         c = [problem.components for problem in phase_laws.problems(case)]
         options, summary, multipliers = solver_plan.database_options(), part.summary, c[0] * constraints
-        pieces = f"{summary.subdomains} subdomain{'s' * (summary.subdomains > 1)}"
+        pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
 
         def described() -> str:
             cell, (subdomains, nodes) = case.cell, zip(*loads, strict=True)
@@ -82,7 +82,7 @@ def _cost_lines(
     yield f"solver     {solver}"
     components = [problem.components for problem in problems]
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
-        yield f"rank {rank:<5} {count} subdomain{'s' * (count > 1)}, {sum(components) * n} degrees of freedom"
+        yield f"rank {rank:<5} {count} subdomain{'s' if count > 1 else ''}, {sum(components) * n} degrees of freedom"
     columns = multipliers if plan.preconditioner == "influence" else 0
     memory = partition_policy.memory(case, nodes, subdomains, components, columns)
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)

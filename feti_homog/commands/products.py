@@ -92,4 +92,5 @@ def _result_folder(arguments: argparse.Namespace) -> Path:
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` makes tables of all cases"
         )
-    raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")
+    names += ["fit.png"] if "fit.json" in names else []
+    raise CaseError(f"{directory} has a study: see {', '.join(names)}")

@@ -203,7 +203,7 @@ class Krylov:
 
     def describe(self, iterations: int) -> str:
         """Return the line that -feti_view prints about the last solve."""
-        line = f"FETI: {self._columns} load case{'s' * (self._columns > 1)}, {iterations} iterations"
+        line = f"FETI: {self._columns} load case{'s' if self._columns > 1 else ''}, {iterations} iterations"
         if not iterations or self.extreme_values is None:
             return line
         smallest, largest = self.extreme_values

@@ -204,9 +204,9 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
     ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
     zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # else perhaps wrong units
-    zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" * doubt
+    zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" if doubt else ""
     if edge / 2**case.cell.refine <= resolved * length:
-        return [f"{law}: the process zone is {zone}"] * doubt + lines
+        return [f"{law}: the process zone is {zone}", *lines] if doubt else lines
     size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
     if not softens:

@@ -245,7 +245,7 @@ def assemble_subdomains(
     with progress.stage("mesh") as line:
         summary = (part := cut(case, lattice, comm, policy)).summary
         shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
-        pieces = f"{summary.subdomains} subdomain{'s' * (summary.subdomains > 1)}"
+        pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {pieces}")
 
     def assembled() -> list[Subdomain]:

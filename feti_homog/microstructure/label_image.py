@@ -33,10 +33,10 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     numbers, counts = np.unique(image, return_counts=True)
     names = [*map(str, numbers.tolist())]
     shares = [f"{name}: {share:.3g} %" for name, share in zip(names, 100 * counts / image.size, strict=True)]
-    listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}" + ", ..." * (len(names) > MOST_FAULTS)
+    listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}{', ...' if len(names) > MOST_FAULTS else ''}"
     faults = []
     if unnamed := [name for name in names if name not in labels]:
-        few = ", ".join(unnamed[:3]) + ", ..." * (len(unnamed) > 3)
+        few = ", ".join(unnamed if len(unnamed) <= 3 else [*unnamed[:3], "..."])
         way = ""
         if len(unnamed) > 16:
             way = "; turn grey values into labels by a threshold, or into a table by fibres --image"

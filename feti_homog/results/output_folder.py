@@ -106,7 +106,7 @@ def replaced(directory: Path, case: Case) -> str:
         if len(are_own) > 1 or os.path.lexists(directory / result_json.NAME):
             stored = latest(directory)
             title = f"{wording.toml_value(stored['case']['name'])} ({stored['date']}, {stored['status']})"
-            line = f"replaces the result of case {title}" * (stored["digest"] != case.digest())
+            line = "" if stored["digest"] == case.digest() else f"replaces the result of case {title}"
     except (FetiHomogError, LookupError, TypeError) as error:
         line = f"replaces a result that cannot be read: {error}"
     if len(are_own) > 1 and are_own[0]:

@@ -53,7 +53,8 @@ class ValueType:
         if self.accepts(value):
             return ""
         advice = suggestion(value, self.options, {}) if self.options and isinstance(value, str) else "expected"
-        return f"expected {self.expected}{hint(value)}" + f"; {advice}" * (not advice.startswith("expected"))
+        proposal = "" if advice.startswith("expected") else f"; {advice}"
+        return f"expected {self.expected}{hint(value)}{proposal}"
 
 
 def hint(value: Any) -> str:

@@ -72,7 +72,7 @@ def means(table: SweepTable) -> list[str]:
     heads = [tables.with_unit(name, table.stress_unit) for name in names]
     columns = [tables.Column("", -max([22, *(len(row[0]) + 4 for row in values)]))]
     columns += [tables.Column(head, max(12, len(head) + 2), ".6g") for head in heads]
-    title = "Results" + f", {MOST_ROWS} of {len(values)} points" * (len(values) > MOST_ROWS)
+    title = "Results" if len(values) <= MOST_ROWS else f"Results, {MOST_ROWS} of {len(values)} points"
     return [*lines, "", *tables.Table(title, columns, values[:MOST_ROWS], most_columns=5).lines] if values else lines
 
 

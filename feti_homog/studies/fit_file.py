@@ -37,7 +37,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
     fit = Fit(document, folder, named, [*unknowns], assignments, data)
     start, faults = [unknown.start for unknown in unknowns.values()], list[str]()
     if len(data) < len(unknowns):
-        counts = f"{len(unknowns)} unknowns, {len(data)} measured value{'s' * (len(data) > 1)}"
+        counts = f"{len(unknowns)} unknowns, {len(data)} measured value{'s' if len(data) > 1 else ''}"
         faults.append(f"[{sections.UNKNOWN}]: {counts}; expected at least as many values")
     cases = fit.at(start).cases
     for test, case in enumerate(cases):

@@ -29,7 +29,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 NAMES = {
     **{name: f"${name[0]}_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66", *CONDUCTION)},
     **{
-        name: f"{constant.symbol} {constant.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
+        name: f"{constant.symbol} {constant.way} the fibres{' (1 / temperature)' if name in RATIOS[2:] else ''}"
         for name, constant in engineering_constants.ABOUT_FIBRES.items()
     },
     "bulk": "plane bulk modulus $k$",

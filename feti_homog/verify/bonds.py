@@ -167,7 +167,7 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
     """Return the friction coefficients (k,) of debonded faces or, if `on_damage`, of damaged bonds."""
     key = "friction_on_damage" if on_damage else "friction"
-    mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
+    mu = [float(section.get("friction", 0.0)) if section.get(key) else 0.0 for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 

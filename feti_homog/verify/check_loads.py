@@ -209,8 +209,9 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(nodes.length), 1.0, place)
-        names = ["debonded_length"] * (number in points_with_state) + ["debonded_shares"] * (sections > 1)
-        missing = sorted({*names}.difference(point))
+        names = {"debonded_length"} if number in points_with_state else set()
+        names |= {"debonded_shares"} if sections > 1 else set()
+        missing = sorted(names.difference(point))
         findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 

@@ -98,7 +98,8 @@ def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: E
     sums[on_face] -= np.where(side % 2 == 1, 1.0, -1.0)[on_face, None] * traction[row[on_face]]
 
     def name(i: int) -> str:
-        return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {row[i]})" * bool(on_face[i])
+        at_face = f" (interface node {row[i]})" if on_face[i] else ""
+        return f"{state.name}, mesh node {nodes.node[first[i]]}{at_face}"
 
     if is_given:  # where unknown reactions act
         sums[copy[np.isin(nodes.node, on_side)]] = 0.0

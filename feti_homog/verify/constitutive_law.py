@@ -85,8 +85,8 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     The row of the other is NaN if the constants do not determine it.  Raises like `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
-    needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"],
-              "E1": ["nu13", "nu23", *["E3"] * (plane == "strain")]}  # fmt: skip
+    beside_E1 = ["nu13", "nu23", "E3"] if plane == "strain" else ["nu13", "nu23"]
+    needed = {"young": ["poisson"], "E_transverse": ["E_axial", "nu_axial"], "E1": beside_E1}
     for constants in (phase_constants(case, phase) for phase in phases):
         rule, zero = np.full(3, np.nan), np.zeros(3)
         names = next((names for form, names in needed.items() if form in constants), [])

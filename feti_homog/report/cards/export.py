@@ -72,7 +72,8 @@ def abaqus(
     if (alpha := material.expansion) is not None:
         has_shears, kind = alpha[3:].any(), "the tensor's" if shears is TENSOR_SHEARS else "engineering"
         lines += [f"*EXPANSION, TYPE={'ANISO' if has_shears else 'ORTHO'}"]
-        lines += [f"** alpha11, alpha22, alpha33, alpha12, alpha13, alpha23; {kind} shears"] * bool(has_shears)
+        if has_shears:
+            lines += [f"** alpha11, alpha22, alpha33, alpha12, alpha13, alpha23; {kind} shears"]
         lines += _data_lines((alpha * shears)[ABAQUS_ORDER] if has_shears else alpha[:3])
     return "\n".join(lines)
 

@@ -235,7 +235,7 @@ def deformed(
             corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
             outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1) + drawn.points.min(axis=0)
         plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
-        label = "undeformed" + f"; displacement × {scale:g}" * (look.title is not None)
+        label = "undeformed" if look.title is None else f"undeformed; displacement × {scale:g}"
         line = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label=label)
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
     marks = cell.interface.mark(axes, moved, state)

@@ -44,7 +44,8 @@ def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> F
         curves = dict(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), responses.T, strict=True))
         inks = [plot_helpers.STRESS_INK[name] for name in voigt.STRESSES]
     for (name, column), ink, mark in zip(curves.items(), inks, MARKS, strict=False):
-        label = f"${name}$" + r" ($\gamma_{12}$)" * (name == "C_{33}" and "C_{66}" not in curves)
+        is_shear = name == "C_{33}" and "C_{66}" not in curves
+        label = rf"${name}$ ($\gamma_{{12}}$)" if is_shear else f"${name}$"
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=label)
     axes.set_xlabel("debonding angle (degrees)")
     axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")

@@ -77,7 +77,8 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     ]
     plot_helpers.legend_below(picture, patches)
     before, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {labels.label(last)}" + ", one of the loads" * (reported(document).name == "stiffness")
+    title = f"{last['label']}: {labels.label(last)}"
+    title += ", one of the loads" if reported(document).name == "stiffness" else ""
     if len(names) > 1:
         title += f" (dashed: {before['label']})" if stacked else f" (dashed: {before['label']}: {labels.label(before)})"
     if len(harmed) > len(chosen):
@@ -95,8 +96,8 @@ def _limit(column: Sequence[Axes]) -> None:
     if high > low and (values.min() < low or values.max() > high):
         column[0].set_ylim(max(values.min(), low), min(values.max(), high))
         for axes, curve in zip(column, curves, strict=True):
-            ends = [f"▲ {curve.max():.3g}"] * bool(curve.max() > high)
-            ends += [f"▼ {curve.min():.3g}"] * bool(curve.min() < low)
+            ends = [f"▲ {curve.max():.3g}"] if curve.max() > high else []
+            ends += [f"▼ {curve.min():.3g}"] if curve.min() < low else []
             if ends:
                 axes.text(0.99, 0.97, "\n".join(ends), ha="right", va="top", transform=axes.transAxes)
 

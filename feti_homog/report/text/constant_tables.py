@@ -244,7 +244,7 @@ def sensitivities(document: Document) -> list[Table]:
         slopes.append([name, *(f"{slope if change else 0.0:.3g}" for slope, change in zip(row, changes, strict=True))])
         shares.append([name, *changes])
     text = "Elasticities, the relative change of a constant by that of a parameter"
-    text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
+    text += "; contact at fixed status" if section.get("at_fixed_status") else ""
     names = [STIFF[2] if constants[k] == "C33" and "C66" not in constants else constants[k] for k in at]
     heads = [(name, max(12, len(name) + 2)) for name in names]
     return [

@@ -40,13 +40,14 @@ def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
     last = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
     intervals = ((name, row, row["interval"]) for name, row in document["unknowns"].items() if row["std"] is not None)
     wide = [name for name, row, (low, high) in intervals if not row["lower"] <= low <= high <= row["upper"]]
-    last += [f"Remark: {', '.join(wide)}: the interval reaches beyond the bounds, which it ignores"] * bool(wide)
+    if wide:
+        last.append(f"Remark: {', '.join(wide)}: the interval reaches beyond the bounds, which it ignores")
     ends = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
     label, worst = max(zip(data, (abs(d["residual"]) for d in measured), strict=True), key=lambda pair: pair[1])
     if ends and worst > MOST_DEVIATIONS:
         last.append(
             f"Remark: the fit ends with {', '.join(ends)} bound, and {label} is {worst:.3g} standard deviations off"
-            f"{'; ' * bool(axes)}{axes}"
+            f"{f'; {axes}' if axes else ''}"
         )
     return "\n\n".join(["", *("\n".join(table.lines) for table in printed), *last])
 

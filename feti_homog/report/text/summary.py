@@ -159,7 +159,7 @@ def _cell(document: Document) -> list[str]:
     shape, fractions = case["cell"], cell.get("fractions", {})
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
-    mesh += [f"order {shape['order']}"] * ("order" in shape)
+    mesh += [f"order {shape['order']}"] if "order" in shape else []
     if "refine" in shape:
         mesh.append(f"refine {shape['refine']}")
     elif "accuracy" in shape:  # the program chose the mesh by it
@@ -218,7 +218,8 @@ def phase_tables(document: Document) -> list[Table]:
     names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
     first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
     unit = with_micro(document["case"].get("output", {}).get("length_unit", ""))
-    at = Column(head := f"at x, y{f' ({unit})' * bool(unit)}", max(16, len(head) + 1))
+    head = f"at x, y ({unit})" if unit else "at x, y"
+    at = Column(head, max(16, len(head) + 1))
     heads = [first, *(column for title in STRESSES.values() for column in (Column(title), at))]
     rows = [
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
