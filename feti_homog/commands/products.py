@@ -1,13 +1,9 @@
 """`feti-homog plot`, `report`, `fields`, `export`, `fibres`: make the products of a result."""
 
 import argparse
-import os
-from pathlib import Path
 
 from feti_homog.analysis import stored_result
-from feti_homog.errors import CaseError
-from feti_homog.results import output_folder, result_json
-from feti_homog.studies import case_folders
+from feti_homog.results import output_folder
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Intracomm
@@ -17,7 +13,7 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Draw the pictures of a stored result again; print their paths.  Collective."""
     from feti_homog.report.plots import figures, plot_helpers
 
-    directory = _result_folder(arguments)
+    directory = output_folder.result_folder(arguments.directory)
     place = mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
     look = plot_helpers.Look(arguments.format, arguments.size, arguments.title)
     paths = mpi_errors.on_root_only(comm, figures.plot, directory, look, arguments.state, arguments.component)
@@ -33,7 +29,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Write the page report.html of a result; print its path.  Collective."""
     from feti_homog.report import page
 
-    directory = _result_folder(arguments)
+    directory = output_folder.result_folder(arguments.directory)
     mpi_errors.on_root_only(comm, stored_result.read, directory)
     path = mpi_errors.on_root_only(comm, page.write, directory)
     if path is not None:
@@ -44,7 +40,7 @@ def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Write the states of a result to VTK files; print their paths.  Collective."""
     from feti_homog.results import viewed_states
 
-    directory = _result_folder(arguments)
+    directory = output_folder.result_folder(arguments.directory)
     mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
     for path in mpi_errors.on_root_only(comm, viewed_states.write_vtk, directory, arguments.format) or []:
         standard_streams.say(str(path))
@@ -54,7 +50,7 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Print the material card of a result, or write it to a file.  Collective."""
     from feti_homog.report.cards import export
 
-    directory = _result_folder(arguments)
+    directory = output_folder.result_folder(arguments.directory)
     text = mpi_errors.on_root(comm, export.card, directory, arguments.format, arguments.symmetry)
     if arguments.out is not None:
         text = str(mpi_errors.on_root(comm, output_folder.write_product, arguments.out, text))
@@ -76,21 +72,3 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
     if arguments.out is not None and arguments.image is not None:
         picture = arguments.image, circles, arguments.pixel, arguments.out
         mpi_errors.on_root_only(comm, lambda: standard_streams.say(micrograph.draw(*picture)))
-
-
-def _result_folder(arguments: argparse.Namespace) -> Path:
-    """Return the result folder named in the arguments.  Raises CaseError for a file, a missing folder, or a study."""
-    directory: Path = arguments.directory
-    if not os.path.isdir(directory):
-        fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"
-        raise CaseError(f"{directory}: {fault}")
-    names = [name for name in case_folders.DOCUMENTS if os.path.exists(directory / name)]
-    if os.path.exists(directory / result_json.NAME) or not names:
-        return directory
-    if names == [case_folders.INDEX_FILE]:
-        raise CaseError(
-            f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
-            f"`feti-homog collect {directory}` makes tables of all cases"
-        )
-    names += ["fit.png"] if "fit.json" in names else []
-    raise CaseError(f"{directory} has a study: see {', '.join(names)}")

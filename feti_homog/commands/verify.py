@@ -20,9 +20,8 @@ def verify(words: Sequence[str]) -> int:
 
     try:
         arguments = command_parser().parse_args(words)
-        directory = arguments.directory
-        if os.path.isdir(directory) and not os.path.lexists(directory / "result.json"):
-            output_folder.refuse_begun(directory)
+        directory = output_folder.result_folder(arguments.directory)
+        output_folder.refuse_begun(directory)
         if os.path.isfile(path := directory / "result.h5"):
             field_guard.require_own(path)
         outcome = certificate.verify(directory)

@@ -36,6 +36,7 @@ RESULT_FILE = re.compile(
 )
 # Files that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, result_json.LOG, LOCK)
+STUDIES = ("sweep.json", "fit.json", "uncertainty.json")  # documents of studies in their folders
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -162,6 +163,23 @@ def latest(directory: Path) -> dict[str, Any]:
     except (FetiHomogError, LookupError, TypeError, ValueError) as error:
         raise CaseError(f"{path} is damaged: {error}") from error
     return opening | {"path": points, "status": place, "unfinished": place}
+
+
+def result_folder(directory: Path) -> Path:
+    """Return `directory`, the folder of a result.  Raises CaseError for a file, a missing folder, or a study."""
+    if not os.path.isdir(directory):
+        fault = "expected the folder of a result, not a file" if os.path.exists(directory) else "no such folder"
+        raise CaseError(f"{directory}: {fault}")
+    names = [name for name in STUDIES if os.path.exists(directory / name)]
+    if os.path.exists(directory / result_json.NAME) or not names:
+        return directory
+    if names == [STUDIES[0]]:
+        raise CaseError(
+            f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
+            f"`feti-homog collect {directory}` makes tables of all cases"
+        )
+    names += ["fit.png"] if "fit.json" in names else []
+    raise CaseError(f"{directory} has a study: see {', '.join(names)}")
 
 
 def refuse_begun(directory: Path) -> None:

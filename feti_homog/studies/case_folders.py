@@ -25,11 +25,10 @@ from feti_homog.schema import types
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import file_locks, input_files
 
-INDEX_FILE, TABLE_FILE, ERROR_FILE = "sweep.json", "cases.csv", "error.txt"
+INDEX_FILE, TABLE_FILE, ERROR_FILE = output_folder.STUDIES[0], "cases.csv", "error.txt"
 CASE_FILE, LOCK_FILE = "case.toml", "lock"
 SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
 """Files and folders that a sweep and its collection write beside sweep.json."""
-DOCUMENTS = (INDEX_FILE, "fit.json", "uncertainty.json")
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
@@ -83,7 +82,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
     the folder cannot be read.  `kind` names the new study in the message.
     """
     for path in sorted(directory.iterdir()):
-        if path.name in DOCUMENTS:
+        if path.name in output_folder.STUDIES:
             raise CaseError(f"--out {directory} holds another study, whose file is {path.name}; choose another folder")
         if entries.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
             raise output_folder.foreign(directory, path.name, kind)

@@ -100,3 +100,15 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
     with pytest.raises(FetiHomogError, match="cannot lock"), Lock(out / output_folder.LOCK):
         pass
     assert mine.read_text() == "mine"
+
+
+def test_a_study_is_no_result(tmp_path):
+    """`verify`, `plot`, `report` and other commands for results name the kind of a folder without result.json."""
+    assert output_folder.result_folder(tmp_path) == tmp_path
+    (tmp_path / "sweep.json").touch()
+    with pytest.raises(CaseError, match=r"such as .*/case-0001, not that of a sweep; `feti-homog collect"):
+        output_folder.result_folder(tmp_path)
+    (tmp_path / "result.json").touch()
+    assert output_folder.result_folder(tmp_path) == tmp_path
+    with pytest.raises(CaseError, match="expected the folder of a result, not a file"):
+        output_folder.result_folder(tmp_path / "result.json")
