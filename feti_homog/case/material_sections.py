@@ -12,6 +12,7 @@ from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
+GPA_TO_MPA = 1e3
 SUGGESTED = (phase_names.MATRIX, phase_names.FIBRE, phase_names.COATING, "fibre:2")  # phases may have any name
 FORMS_OF = {
     name: [form for form, constants in material_forms.MATERIAL_FORMS.items() if name in keys.keys_of(constants)]
@@ -146,14 +147,24 @@ def missing_expansions(tables: object, needed_by: str) -> list[str]:
 
 
 def unlike_moduli(materials: Mapping[str, material_forms.Material]) -> list[str]:
-    """List fibres softer than the matrix, or stiffer by more than the ratio of GPa to MPa, one per line."""
-    names = "young", "stiffness", "E1", "E2", "E3", "E_axial", "E_transverse"
-    moduli = {k: max(float(np.max(vars(m).get(name) or 0.0)) for name in names) for k, m in materials.items()}
-    matrix = moduli.pop(phase_names.MATRIX, 0.0)
-    return [
+    """List moduli that seem to have different units, one line per phase.
+
+    GPA_TO_MPA bounds the ratio of two moduli in one phase, and of fibre to matrix; no fibre is softer than the matrix.
+    """
+    lines, largest = list[str](), dict[str, float]()
+    for phase, material in materials.items():
+        named = vars(material).items()
+        moduli = {name: value for name, value in named if value and name.startswith(("young", "E", "G"))}
+        if moduli and max(moduli.values()) >= GPA_TO_MPA * min(moduli.values()):
+            high, low = (choose(moduli, key=moduli.__getitem__) for choose in (max, min))
+            pair = f"{high} {moduli[high]:g}, {low} {moduli[low]:g}"
+            lines.append(f"[material.{wording.toml_key(phase)}] {pair}: are both in one unit?")
+        largest[phase] = float(np.max([*moduli.values(), *np.ravel(vars(material).get("stiffness", 0.0))]))
+    matrix = largest.pop(phase_names.MATRIX, 0.0)
+    return lines + [
         f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are both in one unit?"
-        for phase, value in moduli.items()
-        if phase != phase_names.COATING and value * matrix and not matrix <= value <= 1e3 * matrix
+        for phase, value in largest.items()
+        if phase != phase_names.COATING and value * matrix and not matrix <= value <= GPA_TO_MPA * matrix
     ]
 
 

@@ -131,6 +131,8 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         axial, transverse = numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
+    if ranges := constant_tables.ranges_across(document):
+        symmetry += f" Over all directions across the fibres the cell has {ranges}."
     known = (document.get("mesh_error") or {}).get("constants", {})
     cards = engineering_constants.ABOUT_FIBRES.items()
     errors = {name: float(known[key]) for key, about in cards if key in known for name in about.card}

@@ -177,11 +177,15 @@ def cell_constants(document: Document) -> list[Table]:
     if estimates is None:
         below.append(f"  closed-form estimates exist for {_with_estimates(document)} only")
     title = f"Along the fibres and across them{label}; {100 * cell['deviation']:.2g} % from transversely isotropic"
-    above = []
-    if (across := document.get("transverse_moduli")) is not None:
-        ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
-        above.append(f"  over all directions across: {', '.join(ranges)}")
+    above = [f"  over all directions across: {ranges}"] if (ranges := ranges_across(document)) else []
     return [*tables, Table(title, columns, rows, above, below, most_columns=5)]
+
+
+def ranges_across(document: Document) -> str:
+    """Return the ranges of E and G over all directions across the fibres, or ""."""
+    across = document.get("transverse_moduli") or {}
+    ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
+    return ", ".join(ranges) if across else ""
 
 
 def _with_estimates(document: Document) -> str:

@@ -244,6 +244,18 @@ def test_moduli_in_unlike_units_are_remarked(tmp_path, matrix, young, is_alike):
     assert case_of(tmp_path, fibre(TRANSVERSE + AXIAL)).remarks() == ()  # only across the fibres it is softer
 
 
+@pytest.mark.parametrize("name", ["E_transverse", "G_axial"])
+def test_moduli_of_one_phase_in_unlike_units_are_remarked(name):
+    fibre = {"E_axial": 230e3, "E_transverse": 15e3, "nu_axial": 0.2, "nu_transverse": 0.3, "G_axial": 15e3}
+    asked = {
+        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.6},
+        "material": {"matrix": {"young": 3500.0, "poisson": 0.35}, "fibre": fibre | {name: 15.0}},
+        "analysis": {"type": "stiffness", "plane": "generalized"},
+    }
+    line = f"[material.fibre] E_axial 230000, {name} 15: are both in one unit?"
+    assert [remark for remark in parse(asked, Path()).remarks() if "unit" in remark] == [line]
+
+
 def test_keys_of_friction_without_friction_are_warned_of():
     numbers = {"stiffness": 10.0, "strength": 1.0, "toughness": 1.0}
     interface = {f"{side}_{name}": value for side in ("normal", "tangential") for name, value in numbers.items()}

@@ -64,7 +64,12 @@ def test_transversely_isotropic_material_is_isotropic_across_the_fibre():
     cosines = np.array([[1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, 0.8, 0.6]])
     turned = turned_stiffness(material.stiffness, cosines)
     assert np.abs(turned - material.stiffness).max() < 1e-14 * np.abs(turned).max()
-    assert material.symmetry == "The nearest transversely isotropic material, at a relative distance of 0.01."
+    first = "The nearest transversely isotropic material, at a relative distance of 0.01."
+    assert material.symmetry == first
+    ranges = {"E_least": 8092.0, "E_largest": 9419.0, "G_least": 2945.0, "G_largest": 3742.0}
+    material = nearest_transversely_isotropic(document(DISTINCT, transverse_moduli=ranges))
+    more = "the cell has E from 8092 to 9419, G from 2945 to 3742."
+    assert material.symmetry == f"{first} Over all directions across the fibres {more}"
 
 
 @both
