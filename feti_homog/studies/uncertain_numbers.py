@@ -78,8 +78,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
         elif number_at(document, path) is None:
             hint = f"; write {wording.dotted_key(path[:-1])} = {value:g}" if path[-1] == "std" else ""
             faults.append(f"{name}: expected a key of the case whose value is a number{hint}")
-        elif path[0] == "material" and path[2:3] == ("strength",):
-            faults.append(f"{name}: no result whose scatter is given depends on it; expected a number alone")
+        elif path[0] == "material" and path[2:3] == ("strength",) and "load" not in document:
+            faults.append(f"{name}: only the utilisation under a [load] depends on it; expected a number alone")
     pairs = table.get(sections.CORRELATION, [])
     faults += _pair_faults(pairs, named)
     if faults:
@@ -126,6 +126,9 @@ def _means(
         faults.append(f"{path[0]} = {wording.toml_value(value)}: expected no number")
     elif not deviation > 0:
         faults.append(f"[{wording.dotted_key(path[:-1])}] {path[-1]} = {wording.toml_value(value)}: {EXPECTED}")
+    elif value.get("cv", 0.0) >= 1.0:
+        place = f"[{wording.dotted_key(path[:-1])}] {path[-1]}"
+        faults.append(f"{place}: cv = {value['cv']:g}: expected less than 1; 5 % is 0.05")
     else:
         # Two symmetric entries of a stiffness are one number, with the name Cij, as in derivatives.
         entry = ((*path[:-2], "C" + "".join(sorted(path[-2:]))) if is_entry else path, deviation)

@@ -25,7 +25,7 @@ from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.studies.predictions import Datum, exact_derivatives, responses
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
-from feti_homog.studies.uncertain_numbers import EXPECTED, SECTIONS, Uncertainty, number_at, read_uncertainty
+from feti_homog.studies.uncertain_numbers import SECTIONS, Uncertainty, number_at, read_uncertainty
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.typing import Float
 
@@ -151,7 +151,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     output |= SILENT
     case = cases_at(document, [{}], folder).cases[0]
     places = {name.partition(".")[0] for name in uncertainty.std}
-    is_differentiable = case.analysis.type in sections.DIFFERENTIABLE
+    # No derivatives of utilisations exist.
+    is_utilised = case.analysis.type == "load" and any(material.strength for material in case.materials.values())
+    is_differentiable = case.analysis.type in sections.DIFFERENTIABLE and not is_utilised
     if is_differentiable and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
         output["sensitivities"] = True
     means = {name: number_at(document, tuple(name.split("."))) or 0.0 for name in uncertainty.std}
@@ -170,9 +172,10 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 def is_study(values: Mapping[str, Any]) -> bool:
     """Return whether a document has a section [uncertainty] or uncertain numbers; both may be faulty."""
-    document, faults = toml_files.to_document(values), list[str]()
-    is_named = sections.UNCERTAINTY in document or bool(read_uncertainty(document, faults).std)
-    return is_named or any(line.endswith(EXPECTED) for line in faults)
+    document = toml_files.to_document(values)
+    with_means = dict(document)
+    read_uncertainty(with_means, [])
+    return with_means != document
 
 
 def _data(documents: Documents) -> list[Datum]:

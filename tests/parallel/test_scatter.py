@@ -89,6 +89,30 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         ours.run(shared_path / "out", comm, comm.size, False, True)
 
 
+@pytest.mark.one_rank
+def test_utilisations_scatter_with_stiffnesses_and_strengths(comm, shared_path):
+    """Under a strain the utilisation is homogeneous of degree 1 in all stiffnesses and of degree -1 in the strength."""
+    matrix = MATERIAL["matrix"] | {"strength": {"principal": {"mean": 0.08, "cv": 0.01}}}
+    case = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.4, "order": 1},
+        "material": MATERIAL | {"matrix": matrix},
+        "analysis": {"type": "load", "plane": "strain"},
+        "load": {"to": {"E11": 0.01, "E22": 0.0, "gamma12": 0.0}},
+    }
+    found = uncertainty.parse(case, Path()).run(shared_path / "out", comm, comm.size, False, True)
+    means = {each["name"]: each["mean"] for each in found["parameters"]}
+    assert [each["by"] for each in found["parameters"]] == ["differences"] * 3
+    results = {each["name"]: each for each in found["results"]}
+    used = results["load_matrix_utilisation"]
+    terms = dict(zip(means, np.array([*means.values()]) * used["derivatives"], strict=True))
+    assert terms.pop("material.matrix.strength.principal") == pytest.approx(-used["value"], rel=1e-3)
+    assert sum(terms.values()) == pytest.approx(used["value"], rel=1e-3)
+    stress = results["load_matrix_principal"]
+    slopes = dict(zip(means, stress["derivatives"], strict=True))
+    assert used["value"] == pytest.approx(stress["value"] / 0.08)
+    assert slopes["material.matrix.strength.principal"] == 0.0
+
+
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
