@@ -21,6 +21,9 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("cohesive", "czm", "cohesive_zone", "softening"), ("bilinear", "exponential")),
     **dict.fromkeys(("brittle", "mohr", "mohr_coulomb", "coulomb"), ("max", "quadratic")),
     **dict.fromkeys(("dt", "delta_t", "deltat", "temp"), ("temperature",)),
+    **{f"{s}{end}": (f"S{i}{i}",) for i in "123" for s in ("s", "sig", "sigma", "sigma_") for end in (i, i + i)},
+    **{f"{e}{end}": (f"E{i}{i}",) for i in "123" for e in ("eps", "epsilon", "epsilon_") for end in (i, i + i)},
+    **{f"{tau}{ij}": (f"S{ij}",) for ij in ("12", "13", "23") for tau in ("tau", "tau_", "sigma", "sigma_")},
     "radius": ("fibre_radius",),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }

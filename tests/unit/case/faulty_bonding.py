@@ -121,6 +121,8 @@ FAULTY_BONDINGS: dict[str, str] = {
     '[path]: belongs to [analysis] type = "path", not "angle"': of_type("angle", BARE_ARC, ANGLE, PATH),
     "[path] strain, to, waypoints: missing; give": of_type("path", "[path]"),
     "[path] strain, waypoints: exclude each other; give one": of_type("path", PATH, "waypoints = [[1, 0, 0]]"),
+    "[path] to.sigma1 = 9.0: unknown key; did you mean S11?\n[path] to.tau_12 = 1.0: unknown key; did you mean S12?":
+        of_type("path", "[path]\nto = {sigma1 = 9.0, tau_12 = 1.0}"),
     "[path] strain = [0.0, 0.0, 0.0]: expected a strain other than zero":
         of_type("path", "[path]\nstrain = [0, 0.0, 0]"),
     "[path] strain = [NaN, 0, 0]: expected a list of three numbers": of_type("path", "[path]\nstrain = [nan, 0, 0]"),
