@@ -227,7 +227,8 @@ def phase_tables(document: Document) -> list[Table]:
     ]
     loads = " or temperature, all others 0" if "temperature" in labels else ", all others 0"
     loads = f", under one unit strain{loads}" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
-    tables = [Table(f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}", heads, rows)]
+    title = f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}"
+    tables = [Table(title, heads, rows, below=_stress_error(document))]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
     acting = [name for name, value in load.items() if value]
     # Load factors need stresses in proportion to the load.
@@ -238,15 +239,28 @@ def phase_tables(document: Document) -> list[Table]:
         if "criterion" in phase:
             value, place = _entry(phase, "utilisation", k)
             used.append([name, phase["criterion"], value, place])
-            used[-1] += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] * has_modes
-            used[-1] += [1.0 / value if value else UNKNOWN] * has_factors
+            if has_modes:
+                used[-1].append(phase["mode"][k] if phase.get("mode") and value else UNKNOWN)
+            if has_factors:
+                used[-1].append(1.0 / value if value else UNKNOWN)
             used[-1] += [load[name] / value if value else UNKNOWN for name in stresses]
-    heads = [first, Column("criterion", 20), Column("utilisation"), at]
-    heads += [Column("mode", 20)] * has_modes + [Column("load factor")] * has_factors
-    heads += [Column(f"at {name}") for name in stresses]
-    alone = "".join(f", at this {name}," for name in stresses)
-    notes = [f"  load factor: at this multiple of the load{alone} the utilisation is 1"] * has_factors
+    heads, notes = [first, Column("criterion", 20), Column("utilisation"), at], list[str]()
+    heads += [Column("mode", 20)] if has_modes else []
+    if has_factors:
+        heads += [Column("load factor"), *(Column(f"at {name}") for name in stresses)]
+        alone = "".join(f", at this {name}," for name in stresses)
+        notes.append(f"  load factor: at this multiple of the load{alone} the utilisation is 1")
     return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
+
+
+def _stress_error(document: Document) -> list[str]:
+    """Return a note with the mean relative error of stresses, the root of the largest relative energy error, or []."""
+    points = [document.get("load", {}), *document.get("path", ()), *document.get("angle", ())]
+    energies = [point.get("mesh_error") for point in points] + [(document.get("mesh_error") or {}).get("energy")]
+    if not (largest := max(energy or 0.0 for energy in energies)):
+        return []
+    error = f"about {100 * largest**0.5:.2g} % in the root mean square"
+    return [f"  mesh error of stresses: {error}; refine until the largest stresses settle"]
 
 
 def _states(document: Document, count: int) -> Sequence[int]:

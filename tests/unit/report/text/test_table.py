@@ -98,7 +98,12 @@ def test_places_of_largest_stresses_are_coordinates_with_a_unit(unit, head):
     measures = (*STRESSES, "utilisation")
     phase = {"phase": "fibre", "state": ["E11"], "criterion": "principal"} | {name: [2.0] for name in measures}
     phase |= {f"{name}_at": [[0.25, 0.5]] for name in measures}
-    largest, used = phase_tables({"case": {"output": {"length_unit": unit}}, "phase_stresses": [phase]})
+    document = {"case": {"output": {"length_unit": unit}}, "phase_stresses": [phase]}
+    largest, used = phase_tables(document)
+    assert (
+        largest.below == []
+        and "about 5 % in the root" in phase_tables(document | {"mesh_error": {"energy": 25e-4}})[0].below[0]
+    )
     assert [column.name for column in largest.columns[2::2]] == [head] * 3 and used.columns[3].name == head
     for table in (largest, used):
         heads, (cells,) = table.lines[1], table.lines[2:3]
