@@ -43,12 +43,16 @@ def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> F
     else:
         curves = dict(zip((plot_helpers.SYMBOLS[name] for name in voigt.STRESSES), responses.T, strict=True))
         inks = [plot_helpers.STRESS_INK[name] for name in voigt.STRESSES]
+    is_relative = "C_{66}" in curves  # in space the stiffness along the fibres would flatten all others
+    unit = plot_helpers.stress_unit(case)
     for (name, column), ink, mark in zip(curves.items(), inks, MARKS, strict=False):
-        is_shear = name == "C_{33}" and "C_{66}" not in curves
-        label = rf"${name}$ ($\gamma_{{12}}$)" if is_shear else f"${name}$"
-        axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=label)
+        first = column[0] if is_relative else 1.0
+        label = r"$C_{33}$ ($\gamma_{12}$)" if name == "C_{33}" and not is_relative else f"${name}$"
+        label += f", {first:.4g} {unit.strip('()')}".rstrip() if is_relative else ""
+        axes.plot(angles, column / first, color=ink, marker=mark, markersize=4, linewidth=1.5, label=label)
     axes.set_xlabel("debonding angle (degrees)")
-    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
+    quantity = f"{'effective stiffness' if stiff else 'macroscopic stress'} {unit}"
+    axes.set_ylabel(f"stiffness / stiffness at {angles[0]:g} degrees" if is_relative else quantity)
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if all(bond["contact"] for bond in path_curves.interface_sections(document)) else "no contact"
     load = "" if stiff else f", $E=[{','.join(f'{e:g}' for e in points[0]['strain'])}]$"

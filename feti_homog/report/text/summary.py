@@ -260,7 +260,7 @@ def _stress_error(document: Document) -> list[str]:
     if not (largest := max(energy or 0.0 for energy in energies)):
         return []
     error = f"about {100 * largest**0.5:.2g} % in the root mean square"
-    return [f"  mesh error of stresses: {error}; refine until the largest stresses settle"]
+    return [f"  mesh error of stresses: {error}, at their peaks perhaps more"]
 
 
 def _states(document: Document, count: int) -> Sequence[int]:

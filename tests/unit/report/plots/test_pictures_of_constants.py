@@ -39,3 +39,13 @@ def test_angles_name_the_shear() -> None:
     assert [line.get_label() for line in lines] == [
         "$C_{11}$", "$C_{22}$", "$C_{12}$", r"$C_{33}$ ($\gamma_{12}$)",
     ]  # fmt: skip
+
+
+def test_stiffnesses_in_space_are_relative_so_that_none_is_flat() -> None:
+    first = np.arange(1.0, 37.0).reshape(6, 6)
+    points = [{"angle": angle, "stiffness": (share * first).tolist()} for angle, share in ((0.0, 1.0), (90.0, 0.5))]
+    case = {"name": "a", "analysis": {"plane": "generalized"}, "output": {"stress_unit": "GPa"}}
+    axes = response_curves.angle({"case": case, "angle": points}).axes[0]
+    assert axes.get_ylabel() == "stiffness / stiffness at 0 degrees"
+    assert [line.get_label() for line in axes.lines[1:3]] == ["$C_{22}$, 8 GPa", "$C_{33}$, 15 GPa"]
+    assert all(list(line.get_ydata()) == [1.0, 0.5] for line in axes.lines[:7])
