@@ -28,7 +28,7 @@ from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, FaceStatus
 from feti_homog.typing import Bool, Float
 
-# Number of pivots, beyond four for each node, after which other searches begin; also the most in a continuation step.
+# Number of pivots, beyond four for each node, after which other searches begin.
 SOLVES = 50
 # Largest number of status sets to try, and of equal continuation steps of mu.
 MOST_TRIED = 256.0
@@ -63,9 +63,12 @@ class StatusSearch:
     start: Float
 
     def run(self, status: Status) -> Found:
-        """Search by pivots, then by trial, then by continuation, until a search succeeds."""
-        result = self.by_pivots(status)
-        return result or self.by_trial(status) or self.by_continuation(status)
+        """Search by pivots, by trial, by continuation, and by pivots from other guesses, until a search succeeds."""
+        result = self.by_pivots(status) or self.by_trial(status) or self.by_continuation(status)
+        for other in (STICK, OPEN_FACE):
+            guess = np.where(self.allowed[:, other], other, status).astype(np.int8)
+            result = result or self.by_pivots(guess) or self.by_continuation(guess)
+        return result
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
         """Search by at most `solves` pivots.  Return the final statuses and x if the forces balance."""
@@ -131,7 +134,7 @@ class StatusSearch:
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:
             faces.friction = min(fraction + step, 1.0) * self.faces.friction
-            result = search.by_pivots(status, SOLVES)
+            result = search.by_pivots(status)
             if result is None:
                 step /= 2.0
             elif fraction + step >= 1.0:
@@ -191,8 +194,17 @@ class CoulombFaces(FaceSystem):
 
         Raises NotCarriedError and StuckError as `step` does.
         """
-        load, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
-        return self._resisting(status, self._at_limits(status, x), load, np.zeros(len(x)))
+        load, status, start = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status), np.zeros(len(x))
+        noise = self.noise(x)
+        allowed = self._at_limits(status, x, noise)
+        try:
+            return self._resisting(status, allowed, load, start)
+        except NotCarriedError:
+            # All faces of a cell that is nearly unloaded are at limits, but for the rounding of the loads.
+            nearly = self._at_limits(status, x, np.maximum(noise, self.least_force(status, load)))
+            if (nearly == allowed).all():
+                raise
+        return self._resisting(status, nearly, load, start)
 
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find the statuses (n,) and x (m,) at the end of an implicit step to a load; arguments as in `search`.
@@ -223,10 +235,10 @@ class CoulombFaces(FaceSystem):
                 return result
         raise StuckError(INDEFINITE)
 
-    def _at_limits(self, status: Status, x: Float) -> Bool:
-        """Return the mask (n, 4) of allowed statuses: present statuses and, at limits, the next statuses."""
+    def _at_limits(self, status: Status, x: Float, noise: Float) -> Bool:
+        """Return the mask (n, 4) of allowed statuses: present statuses and, at limits up to `noise`, the next ones."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
-        (normal, tangential), noise = self.forces(x), self.noise(x)
+        normal, tangential = self.forces(x)
         allowed = np.zeros((self.nodes, 4), bool)
         allowed[np.arange(self.nodes), status] = True
         for sign in (FORWARD, BACKWARD):

@@ -19,7 +19,7 @@ PRODUCTS = 6
 # Number of factorizations that cost as much as the set-up of `FollowedStatuses`.
 FACTORIZATIONS = 12
 
-# Largest force on a free motion, relative to the forces of the loads, that counts as zero.
+# Largest force relative to the forces of the loads that counts as zero: on a free motion, or on an unloaded face.
 UNBALANCED = 1e-7
 
 
@@ -132,16 +132,24 @@ class FaceSystem:
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
         """Return whether no force drives a free motion, such as a fibre that turns in a hole."""
-        (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
-        # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
-        fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
-        fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
+        free, slope = status_system.free_rows(status, self.friction, load.by_stress)
         rows = self.prescribed(status, load, x)[1]
         unbalanced = np.abs(status_system.residual(self.product(x), rows, free, slope))
         unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
-        # Relative to the forces of the prescribed entries at a node and at its neighbours in S.
-        sizes = np.abs(rows) + self.terms(self.terms(fixed))
-        return status_system.largest_share(unbalanced, sizes, slope) <= UNBALANCED
+        return status_system.largest_share(unbalanced, self._sizes(status, load), slope) <= UNBALANCED
+
+    def least_force(self, status: Status, load: Prescribed) -> float:
+        """Return UNBALANCED times the largest scaled force of the loads and prescribed slips."""
+        return float(UNBALANCED * self._sizes(status, load).max(initial=0.0))
+
+    def _sizes(self, status: Status, load: Prescribed) -> Float:
+        """Return the forces (m,) of the prescribed entries at each node and at the node's neighbours in S."""
+        # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
+        fixed, rows = np.zeros((2, len(self.S)))
+        rows[self.loads] = load.values
+        fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
+        fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
+        return np.abs(rows) + self.terms(self.terms(fixed))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
