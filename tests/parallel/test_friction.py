@@ -108,6 +108,20 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
     assert_certified(comm, shared_path / "out")
 
 
+@pytest.mark.one_rank
+@pytest.mark.parametrize(("seed", "mesh_size"), [(0, 0.12), (5, 0.16)])
+def test_a_load_passes_through_zero(comm, seed, mesh_size):
+    """Where loose fibres have lost all tractions at once, and the next leg begins from faces at all their limits."""
+    cell = {"geometry": "random", "fibre_fraction": 0.4, "fibres": 5, "seed": seed, "mesh_size": mesh_size}
+    interface = {"normal_strength": 20.0, "tangential_strength": 30.0, "friction": 0.3}
+    path = {"waypoints": [{"E11": strain} for strain in (0.012, -0.012, 0.012, -0.012)]}
+    points = solved(comm, cell=cell, phases=PHASES, plane="strain", interface=interface, path=path).path
+    assert points[-1].load_factor == 1.0
+    energies = np.array([[p.work, p.stored, p.dissipated, p.friction_heat] for p in points])
+    work, *parts = energies.T
+    assert np.abs(work - sum(parts)).max() < 1e-10 * energies.max() and (np.diff(energies[:, 3]) >= -1e-14).all()
+
+
 @pytest.mark.parametrize(("friction", "under_pressure"), [({}, 1), ({"friction": 0.3}, 0)], ids=["smooth", "friction"])
 def test_a_fibre_that_nothing_touches_moves_freely_and_one_under_pressure_turns(comm, friction, under_pressure):
     case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "interface": WHOLE | friction}
