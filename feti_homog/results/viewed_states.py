@@ -83,9 +83,9 @@ def cell_state(file: Any, state: int) -> ViewedState:
     else:  # from the constitutive laws, in plane strain and plane stress
         rules = constitutive_law.out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
         E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
-    every, displacement = np.arange(len(points), dtype=np.int32), nodes["displacement"]
-    E11, E22, gamma12 = assembly.element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
-    gamma13, gamma23 = assembly.element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
+    displacement = nodes["displacement"]
+    E11, E22, gamma12 = assembly.element_strain(points, triangles, displacement[:, :2], PLANE).T
+    gamma13, gamma23 = assembly.element_strain(points, triangles, displacement[:, 2:], AXIAL).T
     E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
     elements["strain"] = np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
