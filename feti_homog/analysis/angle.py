@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.constants import energy_error, note_accuracy, response_errors, state_error
+from feti_homog.analysis.constants import energy_error, note_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.analysis.tip_records import tip_rates
@@ -27,12 +27,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         if unit:
-            columns, responses = context.unit_responses(f"{label} ", bonds, starts, 1.0)
-            errors, responses = response_errors(context, context.loads.by_problem(responses))
+            columns, errors, responses = context.unit_states(bonds, starts, label=f"{label} ", point=number)
             point |= columns | energy_error(columns["stiffness"], errors)
             if not (context.plane.interface.contact and responses[0].debonded):
                 context.checks.require(label, {"symmetry": averaging.asymmetry(columns["stiffness"])})
-            context.record_unit_states(responses, 1.0, f"{label} ", number)
         else:
             responses = context.plane.respond(np.array([section.strain]), bonds, starts)
             context.progress.say(context.checks.record(label, responses[0]))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside, response_errors
+from feti_homog.analysis.constants import energy_error, fibre_radii, note_accuracy, note_outside
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.homogenization import averaging, phase_laws, unit_cell
@@ -20,10 +20,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     as in axial shear with shear moduli k.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.
     Column j of the result is -<q> under the unit gradient j.
     """
-    columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
+    columns, errors, responses = context.unit_states(context.bonds(None), context.loads.zero_multipliers())
     k = columns["stiffness"]
-    errors, responses = response_errors(context, context.loads.by_problem(responses))
-    context.record_unit_states(responses, 1.0, "", 0)
     context.checks.require("k^ef", {"symmetry": averaging.asymmetry(k)})
     document: dict[str, Any] = {"effective_conductivity": k}
     if (forms := closed_forms(context.cell)) is not None:

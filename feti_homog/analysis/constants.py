@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +13,7 @@ from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.errors import NotCarriedError
-from feti_homog.homogenization import averaging, phase_laws, recovered_fields, unit_cell
+from feti_homog.homogenization import averaging, phase_laws, unit_cell
 from feti_homog.materials import engineering_constants, laws, phase_bounds
 from feti_homog.microstructure import phase_names
 from feti_homog.system.runtime import records
@@ -112,27 +110,6 @@ def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     # Circles are fitted to the nodes of users' meshes: equal radii differ by rounding.
     is_like = not has_springs or all(np.allclose(radius, radius[0], atol=0.0) for radius in radii.values())
     return {phase: float(radius[0]) for phase, radius in radii.items()} if is_plain and is_round and is_like else None
-
-
-def response_errors(
-    context: AnalysisContext, groups: Sequence[Sequence[averaging.Response]]
-) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
-    """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
-
-    Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
-    """
-    if context.states.is_recording or context.case.output.sensitivities:
-        groups = [*map(recovered_fields.with_displacements, (p.cell for p in context.loads.problems), groups)]
-    if not context.case.output.mesh_error:
-        return [], [*chain(*groups)]
-    from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
-
-    errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
-    for problem, group in zip(context.loads.problems, groups, strict=False):
-        touches = problem.interface.contact and any(response.debonded for response in group)
-        errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
-        estimated += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
-    return errors, estimated
 
 
 def mesh_error(
@@ -233,7 +210,7 @@ def state_error(
     Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses
     with element errors.
     """
-    errors, estimated = response_errors(context, [[response] for response in responses])
+    errors, estimated = context.response_errors([[response] for response in responses])
     if not errors:
         return {}, estimated
     energy = sum(2 * response.stored for response in responses)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
 from feti_homog.case import Case
-from feti_homog.homogenization import averaging, cell_remarks, phase_laws, unit_cell
+from feti_homog.homogenization import averaging, cell_remarks, phase_laws, recovered_fields, unit_cell
 from feti_homog.interface import ABSURD, Load
 from feti_homog.interface.contact import BONDED, OPEN, BondState, Equilibrium, coupled_interfaces
 from feti_homog.materials import voigt
@@ -21,7 +22,7 @@ from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization import energy_release
+    from feti_homog.homogenization import energy_release, mesh_estimate
     from feti_homog.results import checkpoints
 
 
@@ -165,15 +166,44 @@ class AnalysisContext:
                 self.progress.say(self.checks.record(f"{label}{'-' if sign < 0 else ''}{name}", response))
         return self.loads.secants(responses, sign), responses
 
-    def record_unit_states(
-        self, responses: Sequence[averaging.Response], load_factor: float, label: str, point: int
-    ) -> None:
-        """Record a state for each unit load, named `label` + load; see `StateRecorder.record`.  Collective."""
+    def response_errors(
+        self, groups: Sequence[Sequence[averaging.Response]]
+    ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
+        """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
+
+        Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
+        """
+        if self.states.is_recording or self.case.output.sensitivities:
+            groups = [*map(recovered_fields.with_displacements, (p.cell for p in self.loads.problems), groups)]
+        if not self.case.output.mesh_error:
+            return [], [*chain(*groups)]
+        from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
+
+        errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
+        for problem, group in zip(self.loads.problems, groups, strict=False):
+            touches = problem.interface.contact and any(response.debonded for response in group)
+            errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
+            shares = errors[-1].shares.T
+            estimated += [replace(response, shares=part) for response, part in zip(group, shares, strict=True)]
+        return errors, estimated
+
+    def unit_states(
+        self, bonds: BondState, starts: Sequence[Float], sign: float = 1.0, label: str = "", point: int = 0
+    ) -> tuple[dict[str, Float], list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
+        """Solve for `sign` times the unit loads, estimate mesh errors, and record the states.  Collective.
+
+        Returns `CellLoads.secants`, errors and responses.  A state has the name `label` + load, with a minus for a
+        negative `sign`; see `StateRecorder.record`.
+        """
+        columns, responses = self.unit_responses(label, bonds, starts, sign)
+        errors, responses = self.response_errors(self.loads.by_problem(responses))
         in_plane = len(self.plane.loads) * self.cell.solver.problem.turns
         pairs = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
-            pairs[f"{label}{name}"] = (response, None) if number < in_plane else (None, response)
-        self.states.record(pairs, load_factor, point)
+            state = (response, None) if number < in_plane else (None, response)
+            pairs[f"{label}{'-' if sign < 0 else ''}{name}"] = state
+        self.states.record(pairs, sign, point)
+        return columns, errors, responses
 
     @cached_property
     def checkpoint(self) -> checkpoints.EventsInMemory:

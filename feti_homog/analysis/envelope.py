@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.analysis.constants import constants, mesh_error, response_errors
+from feti_homog.analysis.constants import constants, mesh_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
@@ -56,9 +56,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
             'superposes loads, which contact forbids: type = "path" finds the onset of one load'
         )
-    columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
-    errors, responses = response_errors(context, context.loads.by_problem(responses))
-    context.record_unit_states(responses, 1.0, "", 0)
+    columns, errors, responses = context.unit_states(bonds, context.loads.zero_multipliers())
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions

@@ -219,14 +219,15 @@ class Result:
         with contact has degree one in the loads.  The result has no fields, states or digest, which only a run makes.
         Raises ValueError for any other result, and for a toughness that is not positive.
         """
-        from feti_homog.results import path_curves  # unused in other analyses
+        from feti_homog.case import interface_section  # unused in other analyses
+        from feti_homog.results import path_curves
 
         document = self.document
         if not path_curves.scales_with_toughness(document):
             raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
         if not toughness > 0:
             raise ValueError(f"toughness = {toughness}: expected an energy per area above 0")
-        s = math.sqrt(toughness / path_curves.interface_sections(document)[0]["toughness"])
+        s = math.sqrt(toughness / interface_section.interface_tables(document["case"])[0]["toughness"])
         case = document["case"] | {name: _times(document["case"][name], s) for name in ("path", "interface")}
         document |= {name: _times(document[name], s) for name in ("path", "peak")} | {"case": case, "digest": ""}
         return replace(Result.of(document), states=None, result_h5=None)

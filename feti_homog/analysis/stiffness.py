@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from feti_homog.analysis.constants import constants, mesh_error, response_errors
+from feti_homog.analysis.constants import constants, mesh_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization import averaging
 
@@ -16,19 +16,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """
     bonds, starts = context.bonds(None), context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
-    columns, responses = context.unit_responses("", bonds, starts, 1.0)
-    errors, responses = response_errors(context, context.loads.by_problem(responses))
-    errors_of_minus = errors[:0]
-    context.record_unit_states(responses, 1.0, "", 0)
+    columns, errors, responses = context.unit_states(bonds, starts)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, loads, first = list(responses), list(context.loads.names), responses
+    under, loads, errors_of_minus = list(responses), list(context.loads.names), errors[:0]
     if one_sided:
-        minus, responses = context.unit_responses("", bonds, starts, -1.0)
-        errors_of_minus, responses = response_errors(context, context.loads.by_problem(responses))
-        context.record_unit_states(responses, -1.0, "-", 0)
+        minus, errors_of_minus, under_minus = context.unit_states(bonds, starts, -1.0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
-        under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in loads)]
+        under, loads = [*under, *under_minus], [*loads, *(f"-{name}" for name in loads)]
     else:
         context.checks.require("L^ef", {"symmetry": averaging.asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
@@ -39,5 +34,5 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.output.sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs need sensitivities
 
-        document |= sensitivities(context, document, first, one_sided)
+        document |= sensitivities(context, document, responses, one_sided)
     return document | mesh_error(context, document, errors, errors_of_minus)

@@ -109,9 +109,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
             faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
         table = replace(table, **{name: stored if asked is None else asked})
     if cell.window == "cut" and table.width is not None and table.height is not None:
-        corner = np.array([table.left, table.bottom], float)
-        places = table.centres - np.where(np.isnan(corner), table.centres.min(axis=0), corner)
-        over = np.maximum(-places, places - [table.width, table.height]).max(axis=1)
+        over = np.maximum(-table.places, table.places - table.size).max(axis=1)
         outside = over > LEFT_OUT * table.radius
         if outside.any() and not outside.all():
             rows = table.row[outside]

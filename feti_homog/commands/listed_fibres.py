@@ -128,8 +128,8 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
         )
         coatings = mesh_fibres.coating_thickness(numbers, is_fibre, ellipses.semi_axes)
         phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-        angles, has_voids = np.zeros(len(phases)), bool(torus.voids)
-        return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, angles, mesh.origin, has_voids)
+        cores, has_voids = np.zeros(len(phases)), bool(torus.voids)
+        return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, cores, mesh.origin, has_voids)
     arrangement = arrange.arrange(cell)
     scale = gmsh_mesher.arrangement_scale(cell, arrangement)
     size = scale * arrangement.size

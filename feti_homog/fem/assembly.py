@@ -98,19 +98,16 @@ def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_mat
     return sums, pattern.indices[first], np.searchsorted(first, pattern.indptr)
 
 
-def element_strain(
-    points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
-) -> tuple[Float, Float]:
-    """Compute the mean element strains (e, m) under displacements u (classes, c), and the element areas (e,)."""
-    strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
+def element_strain(points: Float, triangles: Int32, u: Float, problem: Problem) -> Float:
+    """Compute the mean element strains (e, m) under displacements u (n, c) of the nodes."""
+    strain = np.empty((len(triangles), problem.strains))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
         g, w = gradients(points[triangles[part]])
-        area[part] = w.sum(axis=1)
-        mean = np.einsum("eqad,eq->ead", g, w) / area[part, None, None]
-        gradient = np.einsum("eai,ead->eid", u[node_class[triangles[part]]], mean)
+        mean = np.einsum("eqad,eq->ead", g, w) / w.sum(axis=1)[:, None, None]
+        gradient = np.einsum("eai,ead->eid", u[triangles[part]], mean)
         strain[part] = np.stack([gradient[:, i, d].sum(axis=1) for i, d in parts_of], axis=1)
-    return strain, area
+    return strain
 
 
 def _chunks(numbers: Int, size: int) -> list[Int]:

@@ -243,9 +243,10 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     """Return the distance of fibres, `centres` (n, 2) and `radii` (n,), from the matched table; None without it."""
     if (window := case.cell.matched) is None:
         return None
-    from feti_homog.microstructure import random_fibres  # imports the statistics of neighbours
+    from feti_homog.microstructure import fibre_pattern, random_fibres  # imports the statistics of neighbours
 
-    return random_fibres.distance_of(window, width, height, centres, radii)
+    pattern = fibre_pattern.FibrePattern(width, height, centres, radii, periodic=True)
+    return random_fibres.match_distance(pattern, random_fibres.wanted_distances(window, pattern.count))
 
 
 def in_cell(points: Float, period: Float) -> Float:

@@ -91,8 +91,8 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
     Raises MeshError on every rank if a rank cannot fill a tile.
     """
-    tiles = cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else ()
-    gathered = distributed_arrays.gather(comm, mpi_errors.agree(comm, fill_own, deal_tiles(tiles, comm)))
+    filled = filled_tiles(cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else (), comm)
+    gathered = distributed_arrays.gather(comm, [(k, filling) for k, _, filling in filled])
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=lambda part: part[0])]
 
     def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
@@ -101,18 +101,19 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
     return mpi_errors.on_root_only(comm, joined, cell)
 
 
-def deal_tiles(tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm) -> list[tuple[int, tile_filling.Tile]]:
-    """Deal the `tiles` of rank 0 to all ranks; return the numbers and tiles of this rank.  Collective."""
+def filled_tiles(
+    tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm
+) -> list[tuple[int, tile_filling.Tile, tile_filling.Filling]]:
+    """Deal the `tiles` of rank 0 to all ranks, and fill them; return this rank's with their numbers.  Collective.
+
+    Raises MeshError on every rank if gmsh cannot fill a tile.
+    """
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
     for k, rank in enumerate(distributed_arrays.balanced(loads, comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
-    return distributed_arrays.scatter(comm, parts)
-
-
-def fill_own(tiles: list[tuple[int, tile_filling.Tile]]) -> list[tuple[int, tile_filling.Filling]]:
-    """Fill tiles, and return the fillings with the tile numbers.  Raises MeshError if gmsh cannot fill a tile."""
-    return [(k, tile_filling.fill(tile)) for k, tile in tiles]
+    dealt = distributed_arrays.scatter(comm, parts)
+    return mpi_errors.agree(comm, lambda: [(k, tile, tile_filling.fill(tile)) for k, tile in dealt])
 
 
 def can_be_torn_by_tiles(
@@ -143,12 +144,10 @@ def tear_by_tiles(
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
-    dealt = deal_tiles(() if noded is None else noded.parts, comm)
-    fillings = mpi_errors.agree(comm, fill_own, dealt)
-    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
+    own = filled_tiles(() if noded is None else noded.parts, comm)
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in own])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
-    pairs = zip(dealt, fillings, strict=True)
-    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in pairs]
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for k, tile, filling in own]
     torus, tile = mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)

@@ -100,7 +100,7 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
-    table = {f"C{i + 1}{j + 1}": C[i, j] for i, j in entries} | _along_axes(S)
+    table = {f"C{i + 1}{j + 1}": C[i, j] for i, j in entries} | along_axes(S)
     if n == 3:
         return table
     table |= about_fibres(C)
@@ -112,7 +112,7 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     return table
 
 
-def _along_axes(S: Array) -> dict[str, Any]:
+def along_axes(S: Array) -> dict[str, Any]:
     """Tabulate the moduli and ratios of a compliance, (3, 3) or (6, 6), along the axes of the cell."""
     normal, pairs = (2, ((0, 1), (1, 0))) if len(S) == 3 else (3, ((0, 1), (0, 2), (1, 2)))
     table = {f"E{i + 1}": 1 / S[i, i] for i in range(normal)}
@@ -152,7 +152,7 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
     """Return the moduli of a plane stiffness (3, 3).  Raises numpy.linalg.LinAlgError if it is singular."""
     C = np.asarray(stiffness, dtype=float)
     S, (bulk, shear) = np.linalg.inv(C), isotropic_part(C)
-    table = _along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
+    table = along_axes(S) | {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
     return Moduli(**{name: float(value) for name, value in table.items()}, anisotropy=anisotropy(C))
 
 
@@ -187,7 +187,7 @@ def _distance(C: Float, nearest: Float) -> float:
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
     """Return the constants of a spatial stiffness (6, 6).  Raises numpy.linalg.LinAlgError if it is singular."""
-    table = _along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
+    table = along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
     return EngineeringConstants(**{name: float(value) for name, value in table.items()})
 
 

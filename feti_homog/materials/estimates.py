@@ -1,8 +1,7 @@
 """Estimate the constants of a unidirectional composite by closed formulas from phases and fractions.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
-across the fibres and bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.  Methods return
-NOTHING, with all constants None, for unsupported springs or numbers of fibre kinds.
+across the fibres and bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
 """
 
 import dataclasses
@@ -16,6 +15,8 @@ from feti_homog.materials import engineering_constants, phase_bounds
 from feti_homog.materials.engineering_constants import TransverseIsotropy
 from feti_homog.materials.phase_bounds import NOTHING, Estimate, Estimates, Fibres
 
+ON_SPRINGS = {"mori_tanaka", "composite_cylinders", "self_consistent"}
+OF_SEVERAL_KINDS = {"rule_of_mixtures", "mori_tanaka"}
 MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
 
 
@@ -26,9 +27,14 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
     last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic about x3, nor
     an expansion if a phase has no expansion.
     """
+    able = set(METHODS)
+    if any(family.springs is not None for family in fibres):
+        able &= ON_SPRINGS
+    if len(fibres) != 1:
+        able &= OF_SEVERAL_KINDS
     if not all(map(engineering_constants.is_transversely_isotropic, [matrix, *(f.constants for f in fibres)])):
-        return Estimates(**dict.fromkeys(METHODS, NOTHING))
-    return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
+        able.clear()
+    return Estimates(**{n: method(matrix, fibres) if n in able else NOTHING for n, method in METHODS.items()})
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
@@ -40,8 +46,6 @@ def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Es
     with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.  Voigt
     1889, Reuss 1929; expansions: Schapery 1968, with anisotropic fibres Hashin 1979.
     """
-    if any(family.springs is not None for family in fibres):
-        return NOTHING
     phases, along = _phases(matrix, fibres), _in_parallel(matrix, fibres)
     E, G, G_axial = (1 / sum(c / getattr(x, name) for c, x in phases) for name in MODULI_ACROSS)
     K = 1 / (4 / E - 1 / G - 4 * along["nu_axial"] ** 2 / along["E_axial"])
@@ -58,8 +62,6 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
 
     where E, nu and alpha of a phase are axial values unless the index has a T.  Chamis 1984: isotropic matrix.
     """
-    if len(fibres) != 1 or fibres[0].springs is not None:
-        return NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
     root, along = math.sqrt(c), _in_parallel(matrix, fibres)
     pairs = ((getattr(matrix, name), getattr(fibre, name)) for name in MODULI_ACROSS)
@@ -79,8 +81,6 @@ def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
     with xi = 2 for M = E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, where G_m is across the fibres.
     Only E_T is fitted, so that E_T/(2 G_T) - 1 may exceed 1: nu_T and expansions are None.  Halpin and Kardos 1976.
     """
-    if len(fibres) != 1 or fibres[0].springs is not None:
-        return NOTHING
     fibre, c = fibres[0].constants, fibres[0].fraction
 
     def mean(of_matrix: float, of_fibre: float, xi: float) -> float:
@@ -142,8 +142,6 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
     this arrangement, also on springs; shear across the fibres has only bounds.  Hashin and Rosen 1964; anisotropic
     fibres: Hashin 1979; expansions: Rosen and Hashin 1970; springs on fibres of equal radius: Hashin 1990.
     """
-    if len(fibres) != 1:
-        return NOTHING
     exact = Estimate.of(cylinders_in_matrix(matrix, fibres))
     return dataclasses.replace(exact, E_transverse=None, nu_transverse=None, G_transverse=None)
 
@@ -154,8 +152,6 @@ def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Est
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`; E_T and nu_T
     follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
     """
-    if len(fibres) != 1:
-        return NOTHING
     x = cylinders_in_matrix(matrix, fibres)
     G = transverse_shear(matrix, fibres[0])
     E_transverse, nu_transverse = engineering_constants.transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)

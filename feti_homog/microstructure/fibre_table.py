@@ -87,6 +87,22 @@ class FibreTable:
         return np.column_stack([self.columns["x"], self.columns["y"]])
 
     @property
+    def size(self) -> Float:
+        """The width and height (2,) of the cell, NaN where unknown."""
+        return np.array([self.width, self.height], float)
+
+    @property
+    def places(self) -> Float:
+        """The centres (N, 2) relative to the lower left corner of the cell."""
+        return self.centres - self.corner
+
+    @property
+    def corner(self) -> Float:
+        """The lower left corner (2,) of the cell, by default the least coordinates of the centres."""
+        given = np.array([self.left, self.bottom], float)
+        return np.where(np.isnan(given), self.centres.min(axis=0), given)
+
+    @property
     def is_void(self) -> Bool:
         """The mask (N,) of voids."""
         return np.array([name == VOID for name in self.phase], bool)

@@ -58,7 +58,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         coating=np.where(is_hollow, outlines.radii - core, table.coating[rows] * outlines.radii),
         is_hollow=is_hollow,
         row=rows,
-        origin=tuple(_corner(table).tolist()),
+        origin=tuple(table.corner.tolist()),
         remarks=remarks,
     )
     shifted = arrangements.clear_shift(fibres)
@@ -66,7 +66,7 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), arrangements.clearance(shifted))
     if not is_placed or arrangements.clearance(fibres) < clear or arrangements.in_voids(fibres, np.zeros((1, 2))).all():
         moved = (fibres.centres[0] - shifted.centres[0] + fibres.size / 2) % fibres.size - fibres.size / 2
-        rounded = replace(_rounded(shifted), origin=tuple((_corner(table) + size[0] * moved).tolist()))
+        rounded = replace(_rounded(shifted), origin=tuple((table.corner + size[0] * moved).tolist()))
         return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
@@ -77,8 +77,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     Fibres that touch, or overlap by up to SAME_FIBRE times the smaller radius, shrink until they separate, but not
     across the border of a cut window. Returns the table, and a remark with the rows of the shrunk fibres.
     """
-    assert table.width is not None and table.height is not None
-    size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
+    size, centres = table.size, table.places
     retained = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
     outer = table.outlines[retained].at(centres[retained]).grown((table.coating * table.radius)[retained])
     first, second, gap, _, across = _gaps(table, retained, outer, size)
@@ -118,10 +117,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Only cut windows have
     moves. Raises MeshError as `table_arrangement` does.
     """
-    assert table.width is not None and table.height is not None
-    size = np.array([table.width, table.height])
-    centres = table.centres - _corner(table)
-    is_cut = window == "cut"
+    size, centres, is_cut = table.size, table.places, window == "cut"
     # The largest length of every row, and the column of this length.
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
@@ -170,8 +166,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
     """Return the table indices (fibres,) of the fibres in the cell, without voids and images."""
-    size = np.array([table.width, table.height], float)
-    first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
+    first, _ = _without_images(table, table.places, table.size, window == "cut")
     return np.flatnonzero(first & ~table.is_void)
 
 
@@ -181,15 +176,8 @@ def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | N
     The images belong to the table indices `rows` (k,), by default to `fibre_rows`.
     """
     listed = table.centres[fibre_rows(table, window) if rows is None else rows]
-    size = np.array([table.width, table.height], float)
-    moves = (centres - listed + size / 2) % size - size / 2
+    moves = (centres - listed + table.size / 2) % table.size - table.size / 2
     return np.asarray(listed + np.where(np.abs(moves) > cut_window.TOLERANCE * table.radius.mean(), moves, 0.0))
-
-
-def _corner(table: FibreTable) -> Float:
-    """Return the lower left corner (2,) of the cell, by default the least coordinates of the centres."""
-    given = np.array([table.left, table.bottom], float)
-    return np.where(np.isnan(given), table.centres.min(axis=0), given)
 
 
 def _raise_faults(table: FibreTable, faults: list[str]) -> None:

@@ -221,12 +221,3 @@ def placed(
             return replace(pattern, centres=centres)
     words = f"with the fibre fraction {pattern.fibre_fraction:.4g} and the smallest gap {gap:.4g}"
     raise MeshError(f"no random pattern {words} is found")
-
-
-def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """Return the `match_distance`, in mean diameters, between a measured window and N discs in a periodic cell.
-
-    Raises ValueError if the window is too small.
-    """
-    pattern = FibrePattern(width, height, centres, radii, periodic=True)
-    return match_distance(pattern, wanted_distances(window, pattern.count))

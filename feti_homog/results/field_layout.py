@@ -6,7 +6,7 @@ vectors with three components, tensors and single columns.  They are virtual and
 datasets when a viewer reads them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -215,22 +215,21 @@ def _vector(name: str, third: str = "") -> View:
     return View("vector", name, 3, name, columns, sentence)
 
 
-def _tensor(name: str, source: str, entries: Mapping[str, tuple[str, int | None]]) -> View:
-    """Return the view of a symmetric tensor [11, 12, 13, 21, ..., 33].  Components without an entry are 0."""
+def _stress_tensor(axial: Sequence[str] = ()) -> View:
+    """Return the view of the stress tensor, with the stresses `axial`, too.  Components without a stress are 0."""
+    entries: dict[str, tuple[str, int | None]] = {"33": ("stress_33", None)}
+    entries |= {name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)}
+    entries |= {name[1:]: ("axial_stress", column) for column, name in enumerate(axial)}
     places = enumerate(("11", "12", "13", "12", "22", "23", "13", "23", "33"))
     columns = {place: entries[entry] for place, entry in places if entry in entries}
-    sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
-    return View("tensor", name, 9, source, columns, sentence)
+    sentence = "tensor of `stress`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
+    return View("tensor", "stress", 9, "stress", columns, sentence)
 
 
 def _column(name: str, source: str, column: int) -> View:
     return View("column", name, 0, source, {0: (source, column)}, f"column {column} of `{source}`")
 
 
-STRESS_TENSOR: dict[str, tuple[str, int | None]] = {
-    **{name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)},
-    "33": ("stress_33", None),
-}
 COLUMNS = (
     *(_column(name, "stress", column) for column, name in enumerate(voigt.STRESSES)),
     *(_column(f"{table}_{name}", table, k) for table in ("traction", "jump") for k, name in enumerate("nt")),
@@ -240,15 +239,13 @@ AXIAL = "axial_displacement"  # dataset of states that are not plane
 # The views of each group; /state/K stands for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
-    GROUP_OF_STATES: (_vector("displacement"), _tensor("stress", "stress", STRESS_TENSOR), *COLUMNS),
+    GROUP_OF_STATES: (_vector("displacement"), _stress_tensor(), *COLUMNS),
 }
 
 # The views of a state in generalized plane strain or conduction.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
-    _tensor(
-        "stress", "stress", STRESS_TENSOR | {s[1:]: ("axial_stress", k) for k, s in enumerate(voigt.AXIAL_STRESSES)}
-    ),
+    _stress_tensor(voigt.AXIAL_STRESSES),
     *COLUMNS,
     *(_column(name, "axial_stress", column) for column, name in enumerate(voigt.AXIAL_STRESSES)),
 )

@@ -58,11 +58,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
     number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
     if path_curves.is_proportional(document):
-        load = np.array([point["load_factor"] for point in points])
-        records = np.flatnonzero(load >= np.maximum.accumulate(load))
-        fallen = stress[records[1:]] * load[records[:-1]] / load[records[1:]]
-        curve = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
-        number = np.r_[records[0], np.repeat(records[1:], 2)]
+        number = np.repeat(path_curves.rising_points(points), 2)[1:]
+        curve = path_curves.load_controlled(points)[1:, component] + 0.0
     size = np.abs(curve)
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
@@ -194,8 +191,8 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + path_curves.SAME_LOAD).sum()) if legs else 0
     # Branches are rays through zero: stress and strain after a drop are scaled to the load before the drop.
-    rising, scaled, later = load[:of_first_leg], per_strain * strain, list[Drop]()
-    for a, b in pairwise(np.flatnonzero(rising >= np.maximum.accumulate(rising)).tolist()):
+    scaled, later = per_strain * strain, list[Drop]()
+    for a, b in pairwise(path_curves.rising_points(points[:of_first_leg]).tolist()):
         scale = load[a] / load[b]
         jump = _norm((scaled[b] * scale - scaled[a])[None], 0.5)[0]
         later += [(max(float(size[a] - size[b] * scale), float(jump)), a, b)] * (b > a + 1)

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import bond_laws, load_sections
+from feti_homog.case import bond_laws, interface_section, load_sections
 from feti_homog.materials import voigt
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 SAME_LOAD = 1e-9  # relative tolerance for equal load factors
 # Fractions of the largest component, below which a component is zero for the solver, or invisible in a plot.
@@ -136,20 +136,21 @@ def is_proportional(document: Document) -> bool:
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
-def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
-    """Return the [interface] sections of a case, empty for perfect bonding."""
-    sections = document["case"].get("interface", [])
-    return sections if isinstance(sections, list) else [sections]
-
-
 def scales_with_toughness(document: Document) -> bool:
     """Return whether strains and stresses are proportional to the root of the toughness.
 
     This holds if bonds break by energy, on springs that do not depend on the toughness.
     """
-    laws = [bond_laws.LAWS.get(section.get("criterion", bond_laws.DEFAULT)) for section in interface_sections(document)]
+    tables = interface_section.interface_tables(document["case"])
+    laws = [bond_laws.LAWS.get(table.get("criterion", bond_laws.DEFAULT)) for table in tables]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
+
+
+def rising_points(points: Sequence[Point]) -> Int:
+    """Return the numbers of the points that a rising load reaches."""
+    load = np.array([point["load_factor"] for point in points])
+    return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
@@ -161,9 +162,9 @@ def load_controlled(points: Sequence[Point]) -> Float:
     """
     load = np.array([point["load_factor"] for point in points])
     values = np.array([[*point["stress"], *point["strain"]] for point in points])
-    records = np.flatnonzero(load >= np.maximum.accumulate(load))
-    corners = [np.zeros(values.shape[1]), values[records[0]]]
-    for before, after in pairwise(records):
+    reached = rising_points(points)
+    corners = [np.zeros(values.shape[1]), values[reached[0]]]
+    for before, after in pairwise(reached):
         corners += [values[after] * load[before] / load[after], values[after]]
     return np.array(corners)
 

@@ -83,9 +83,9 @@ def cell_state(file: Any, state: int) -> ViewedState:
     else:  # from the constitutive laws, in plane strain and plane stress
         rules = constitutive_law.out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
         E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
-    every, displacement = np.arange(len(points), dtype=np.int32), nodes["displacement"]
-    E11, E22, gamma12 = assembly.element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
-    gamma13, gamma23 = assembly.element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
+    displacement = nodes["displacement"]
+    E11, E22, gamma12 = assembly.element_strain(points, triangles, displacement[:, :2], PLANE).T
+    gamma13, gamma23 = assembly.element_strain(points, triangles, displacement[:, 2:], AXIAL).T
     E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
     elements["strain"] = np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
@@ -112,7 +112,6 @@ def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array
     return {name: file[place.replace("/K/", f"/{state}/")][()] for name, place in places.items()}
 
 
-FORMATS = ("vtu", "vtkhdf")
 KINDS = {1: 1, 3: 5, 6: 22}  # VTK's cell types, vertex and triangles, by number of nodes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
 PARTS = {"cell": cell_state, "interface": interface_state}
@@ -121,7 +120,7 @@ PARTS = {"cell": cell_state, "interface": interface_state}
 def write_vtk(directory: Path, kind: str) -> list[Path]:
     """Write the states of `directory`/result.h5 in a VTK format; return the paths.  Call on one rank.
 
-    `kind` is one of `FORMATS`.  `vtu` writes cell_0000.vtu, ... and their list cell.pvd; `vtkhdf` writes cell.vtkhdf,
+    `kind` is `vtu` or `vtkhdf`.  `vtu` writes cell_0000.vtu, ... and their list cell.pvd; `vtkhdf` writes cell.vtkhdf,
     with all states as steps.  A cell with interface nodes also has interface_0000.vtu, ... or interface.vtkhdf.  The
     time of a state is its number, since load factors may snap back; load factors and means are field data.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import Case, bond_laws, load_sections, sections
+from feti_homog.case import Case, bond_laws, interface_section, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.report.text import point_tables
@@ -145,7 +145,7 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     soften.  This holds if all loads grow in proportion up to the onset, without a previous temperature.  The result is
     None if result.json does not determine the derivatives.
     """
-    tables = path_curves.interface_sections(document)
+    tables = interface_section.interface_tables(document["case"])
     name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name
     if (sensitivities := document.get("sensitivities")) is not None:
         if name in sensitivities["parameters"]:

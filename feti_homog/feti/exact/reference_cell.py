@@ -44,9 +44,7 @@ class AssembledSchur:
         Rows where `active` (owned rows,) is 1 must leave no rigid-body motion free.  LAPACK factors dense matrices;
         options for sparse matrices have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
 
-        Raises:
-            TypeError: a boundary operator is not dense.
-            LinAlgError, MemoryError, CaseError: as in `DirectSolver`.
+        Boundary operators must be dense.  Raises like `DirectSolver`.
         """
         is_inactive, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
         starts, sizes = jump_operator.node_rows
@@ -97,17 +95,14 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
     """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs, as in `AssembledSchur`.  Collective.
 
     The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
-    `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.
-
-    Raises:
-        TypeError: a boundary operator is not dense.
+    `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.  Boundary operators must be
+    dense.
     """
     comm, size, columns = operators.comm, Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
 
     def blocks() -> Iterator[tuple[Int, Int, Float]]:
         for operator, span, j in zip(operators.with_springs, operators.slices, columns, strict=True):
-            if not is_dense(operator):
-                raise TypeError("the assembled Schur complement needs dense boundary operators")
+            assert is_dense(operator)  # `solver_plan.choose` refuses others
             T = Z[span][:, j].T.tocsr()
             yield j, j, T @ (T @ operator.S).T
 

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti import DualSolution
-from feti_homog.interface.contact import BondState, CoupledInterfaces, Equilibrium
-from feti_homog.interface.laws.bond_law import UTILISATION_TIE, BondLaw
-from feti_homog.interface.loads import Load, Macroscopic, Multipliers
+from feti_homog.interface.contact import BondState, Equilibrium
+from feti_homog.interface.laws.bond_law import UTILISATION_TIE
+from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.interface.path.leg import SAME_SHARE, Leg
 from feti_homog.interface.path.onsets import first_break, first_change
 from feti_homog.interface.path.path_points import PathState, Point, most_utilised
@@ -41,13 +41,8 @@ class FrictionlessLeg(Leg):
     """
 
     _state: Equilibrium
-
-    def __init__(
-        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
-    ) -> None:
-        super().__init__(cell, law, waypoints, leg, begin)
-        # Fraction before which the line bends, and whether the last prediction was a false alarm.
-        self._bends_before, self._false_alarm, self._from = np.inf, False, begin
+    # Fraction before which the line bends, and whether the last prediction was a false alarm.
+    _bends_before, _false_alarm = np.inf, False
 
     @property
     def state(self) -> Equilibrium:

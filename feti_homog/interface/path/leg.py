@@ -41,7 +41,7 @@ class Leg(ABC):
         self.origin = begin.last if begin.position == 0.0 else begin.origin
         self.start = cell.leg_start(self.origin, waypoints[leg - 1] if leg else None, self.end)
         self._share = self._reported = begin.position
-        self._bonds, self._energies = begin.bonds, path_points.NO_ENERGIES
+        self._from, self._bonds, self._energies = begin, begin.bonds, path_points.NO_ENERGIES
         self._utilisation: tuple[Equilibrium, tuple[Float, float, Bool]] | None = None
 
     @property

@@ -74,16 +74,8 @@ class EffectiveMaterial:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Return the engineering constants by name, in the order of an Abaqus card.
-
-        With the compliance S: E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i), G_ij = 1/S_kk.
-        """
-        S = self.compliance
-        return {
-            **{f"E{i + 1}": float(1.0 / S[i, i]) for i in range(3)},
-            **{f"nu{i + 1}{j + 1}": float(-S[i, j] / S[i, i]) for i, j in ((0, 1), (0, 2), (1, 2))},
-            **{f"G{i + 1}{j + 1}": float(1.0 / S[k, k]) for k in (5, 4, 3) for i, j in [PAIRS[k]]},
-        }
+        """Return the engineering constants by name, in the order of an Abaqus card."""
+        return {name: float(value) for name, value in engineering_constants.along_axes(self.compliance).items()}
 
 
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:

@@ -196,7 +196,7 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
-    height = _inches(size, (WIDTH - 0.5) / columns)[1] + 0.55  # with room for a colour bar and a title
+    height = _height(size, (WIDTH - 0.5) / columns) + 0.55  # with room for a colour bar and a title
     figure = look.figure(WIDTH, rows * height + 0.7, "compressed")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
@@ -218,13 +218,9 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     return figure
 
 
-def _inches(size: Array, width: float) -> tuple[float, float]:
-    """Return width and height in inches for a cell with sides `size` (2,).
-
-    The drawn cell is `width` wide, but at most MOST_HEIGHT high.
-    """
-    scale = min(width / size[0], MOST_HEIGHT / size[1])
-    return float(scale * size[0]), float(scale * size[1])
+def _height(size: Array, width: float) -> float:
+    """Return the height in inches of a cell with sides `size` (2,) that is `width` wide, at most MOST_HEIGHT."""
+    return float(min(width / size[0], MOST_HEIGHT / size[1]) * size[1])
 
 
 def _grid(panels: int, ratio: float) -> tuple[int, int]:
@@ -245,7 +241,7 @@ def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
-    figure = Figure(figsize=(FRAME + 0.55, _inches(high - low, FRAME)[1] + 1.05), dpi=100, layout="constrained")
+    figure = Figure(figsize=(FRAME + 0.55, _height(high - low, FRAME) + 1.05), dpi=100, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
     axes, frames = figure.subplots(), list[Image.Image]()
     figure.suptitle(cell.caption)

@@ -123,7 +123,7 @@ def _line_style(values: Array, drawn: list[Array]) -> str:
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
     """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
     points, drawn = document["path"], list[Array]()
-    rising = _records(points) if path_curves.is_proportional(document) else None
+    rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
         count = np.array([point[key] for point in points])
@@ -138,12 +138,6 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
         axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged share × nodes")
     axes.set_ylabel("interface\nnodes")
     axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
-
-
-def _records(points: Sequence[Mapping[str, Any]]) -> Array:
-    """Return the numbers of the points that a rising load reaches."""
-    load = np.array([point["load_factor"] for point in points])
-    return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
 def _number_points(axes: Axes, curve: Array, numbers: Sequence[int]) -> None:
@@ -182,9 +176,9 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
         return None
     case, legs = document["case"], path_curves.legs(document)
     names = ("work", "stored", "stored_in_springs", "dissipated", "fracture_energy", "friction_heat")
-    rising = _records(points) if path_curves.is_proportional(document) else None
+    rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
     if rising is None:  # the stack needs a position that rises
-        points = [points[k] for k in _records(points)]
+        points = [points[k] for k in path_curves.rising_points(points)]
     work, stored, springs, lost, fracture, heat = (_column(points, name, rising) for name in names)
     if rising is not None:
         lost = _column(points, "dissipated_strain_controlled", rising)

@@ -18,7 +18,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from matplotlib.tri import Triangulation
 
-from feti_homog.case import bond_laws
+from feti_homog.case import bond_laws, interface_section
 from feti_homog.errors import escaped
 from feti_homog.materials import voigt
 from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
@@ -256,7 +256,7 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
 
 def bond_limits(case: Document) -> list[str]:
     """Describe every interface law in one line.  With several laws, the lines begin with the phases."""
-    bonds, output = path_curves.interface_sections({"case": case}) or [{}], case.get("output", {})
+    bonds, output = interface_section.interface_tables(case) or [{}], case.get("output", {})
     stress, length = (with_micro(output.get(name, "")) for name in ("stress_unit", "length_unit"))
     units = stress, f"{stress} {length}" if stress and length else ""
     if len(bonds) == 1:

@@ -9,12 +9,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
+from feti_homog.case import interface_section
 from feti_homog.materials import voigt
 from feti_homog.report.plots import path_picture, plot_helpers
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.report.text.summary import reported
-from feti_homog.results import path_curves
 from feti_homog.typing import Array, Document
 
 Curve = Callable[[Document, plot_helpers.Look], Figure | None]
@@ -54,7 +54,7 @@ def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> F
     quantity = f"{'effective stiffness' if stiff else 'macroscopic stress'} {unit}"
     axes.set_ylabel(f"stiffness / stiffness at {angles[0]:g} degrees" if is_relative else quantity)
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
-    contact = "contact" if all(bond["contact"] for bond in path_curves.interface_sections(document)) else "no contact"
+    contact = "contact" if all(bond["contact"] for bond in interface_section.interface_tables(case)) else "no contact"
     load = "" if stiff else f", $E=[{','.join(f'{e:g}' for e in points[0]['strain'])}]$"
     axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)

@@ -16,7 +16,6 @@ from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_pattern import FibrePattern, read_window
 from feti_homog.microstructure.random_fibres import (
-    distance_of,
     match_distance,
     matched,
     nearest_neighbours,
@@ -40,7 +39,7 @@ def pattern_of(arrangement):
 
 
 def distance(table, arrangement):
-    return distance_of(read_window(table), 1.0, 1.0, arrangement.centres, arrangement.radii)
+    return match_distance(pattern_of(arrangement), wanted_distances(read_window(table), len(arrangement.radii)))
 
 
 @pytest.mark.parametrize("seed", range(3))

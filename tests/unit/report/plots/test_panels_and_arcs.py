@@ -176,5 +176,5 @@ def test_panels_leave_no_row_empty(panels: int, ratio: float) -> None:
 
 
 def test_panels_and_frames_of_tall_cells_fit_on_a_page() -> None:
-    assert deformed_panels._inches(np.array([1.0, 1.0]), 3.6) == (3.6, 3.6)
-    assert deformed_panels._inches(np.array([8.0, 80.0]), 3.6) == pytest.approx((0.6, 6.0))
+    assert deformed_panels._height(np.array([1.0, 1.0]), 3.6) == 3.6
+    assert deformed_panels._height(np.array([8.0, 80.0]), 3.6) == pytest.approx(6.0)
