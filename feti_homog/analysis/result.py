@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, TypeVar
@@ -17,12 +16,6 @@ from feti_homog.schema import wording
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float, Intracomm
 
-LOADS = ("strain", "stress", "temperature", "to", "waypoints", "first_break_strain", "first_break_stress",
-         "stress_left")  # fmt: skip
-ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
-            "toughness", "G_I", "G_II")  # fmt: skip
-POWERS = dict.fromkeys(LOADS, 1) | dict.fromkeys(ENERGIES, 2)
-"""Powers of s in `Result.path_scaled` for entries of result.json and for all numbers inside; others do not change."""
 CONSTANTS = ("moduli", "constants", "transversely_isotropic", "transverse_moduli")
 Part = TypeVar(
     "Part", field_layout.MeshPart, field_layout.FibrePart, field_layout.InterfacePart, field_layout.StatePart
@@ -210,28 +203,6 @@ class Result:
         columns = dict(zip(names, (curve * [*[1.0] * (len(names) - 1), sign]).T, strict=True))
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
-    def path_scaled(self, *, toughness: float) -> Result:
-        """Return the path for another toughness of the first interface.
-
-        With s = sqrt(toughness / toughness in the case), loads times s and every toughness times s^2 lead to the same
-        events, with strains and stresses times s and energies times s^2.  This holds if bonds break by energy on
-        springs of fixed stiffness: such springs break at tractions proportional to s, and the response of a cell
-        with contact has degree one in the loads.  The result has no fields, states or digest, which only a run makes.
-        Raises ValueError for any other result, and for a toughness that is not positive.
-        """
-        from feti_homog.case import interface_section  # unused in other analyses
-        from feti_homog.results import path_curves
-
-        document = self.document
-        if not path_curves.scales_with_toughness(document):
-            raise ValueError("only a path whose bonds break by energy on springs scales with the toughness")
-        if not toughness > 0:
-            raise ValueError(f"toughness = {toughness}: expected an energy per area above 0")
-        s = math.sqrt(toughness / interface_section.interface_tables(document["case"])[0]["toughness"])
-        case = document["case"] | {name: _times(document["case"][name], s) for name in ("path", "interface")}
-        document |= {name: _times(document[name], s) for name in ("path", "peak")} | {"case": case, "digest": ""}
-        return replace(Result.of(document), states=None, result_h5=None)
-
     def __getattr__(self, name: str) -> Any:
         """Return a number by its name in a record of CONSTANTS, such as E1.
 
@@ -261,12 +232,3 @@ class Result:
 
 
 RECORDS = (*filter(is_dataclass, (*vars(cell_records).values(), *vars(result_records).values())), Result)
-
-
-def _times(value: Any, s: float, power: int = 0) -> Any:
-    """Multiply the numbers in a value by s^k.  POWERS has the power k of an entry."""
-    if isinstance(value, Mapping):
-        return {name: _times(item, s, POWERS.get(name, power)) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_times(item, s, power) for item in value]
-    return value * s**power if power else value

@@ -149,7 +149,7 @@ class FaceSystem:
         rows[self.loads] = load.values
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
         fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
-        return np.abs(rows) + self.terms(self.terms(fixed))
+        return np.asarray(np.abs(rows) + self.terms(self.terms(fixed)))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
