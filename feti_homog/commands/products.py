@@ -71,9 +71,11 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
         circles, text = mpi_errors.on_root(comm, micrograph.fibres, arguments.image, arguments.pixel)
     if arguments.out is None:
         mpi_errors.on_root_only(comm, standard_streams.print_product, text)
-    elif (path := mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
+        return
+    path = mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)
+    if path is not None:
         standard_streams.say(str(path))
-    if arguments.out is not None and arguments.image is not None:
+    if arguments.image is not None:
         picture = arguments.image, circles, arguments.pixel, arguments.out
         mpi_errors.on_root_only(comm, lambda: standard_streams.say(micrograph.draw(*picture)))
 
@@ -92,4 +94,5 @@ def _result_folder(arguments: argparse.Namespace) -> Path:
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` makes tables of all cases"
         )
-    raise CaseError(f"{directory} has a study: see {', '.join(names)}{' and fit.png' * ('fit.json' in names)}")
+    picture = " and fit.png" if "fit.json" in names else ""
+    raise CaseError(f"{directory} has a study: see {', '.join(names)}{picture}")

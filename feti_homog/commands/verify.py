@@ -23,8 +23,9 @@ def verify(words: Sequence[str]) -> int:
         directory = arguments.directory
         if os.path.isdir(directory) and not os.path.lexists(directory / "result.json"):
             output_folder.refuse_begun(directory)
-        if os.path.isfile(path := directory / "result.h5"):
-            field_guard.require_own(path)
+        fields = directory / "result.h5"
+        if os.path.isfile(fields):
+            field_guard.require_own(fields)
         outcome = certificate.verify(directory)
         if prints:
             standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)
