@@ -20,7 +20,7 @@ LINES = {
     ".": 470,
     "analysis": 3000 + 115 + 89,
     "case": 2880 + 25 + 120,
-    "commands": 560 + 10 + 67,
+    "commands": 560 + 10 + 56,
     "fem": 1150 + 3 - 9,
     "feti": 6300 + 0 + 61,
     "homogenization": 3230 + 49 + 30,
@@ -32,10 +32,10 @@ LINES = {
     "results": 2430 + 110 + 35,
     "schema": 430 + 0 + 10,
     "studies": 2950 + 70 + 4,
-    "system": 1770,
+    "system": 1770 + 0 + 23,
     "verify": 3100 + 150 + 76,
 }
-FILES, TOTAL = 310, 45000 + 368 + 1158
+FILES, TOTAL = 310, 45000 + 368 + 1171
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

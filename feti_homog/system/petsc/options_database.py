@@ -112,7 +112,9 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     solver) is made for a 1 x 1 matrix and applied once, because some methods fail only then.  PETSc marks the options
     that it reads, and prints all readable options with -help.  Options that print are removed meanwhile.
     """
-    faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
+    faults = []
+    viewers = [name for name in options if values.is_viewer(name)]
+    database, comm = PETSc.Options(), PETSc.COMM_SELF
     try:
         for name in viewers:
             database.delValue(name)
