@@ -27,15 +27,15 @@ LINES = {
     "interface": 4000 + 0 - 23,
     "materials": 1430 + 52 + 122,
     "mesh": 5500 + 31 + 278,
-    "microstructure": 2140 + 0 + 80,
+    "microstructure": 2140 + 0 + 89,
     "report": 3420 + 150 + 109,
     "results": 2430 + 110 + 35,
     "schema": 430 + 0 + 10,
     "studies": 2950 + 70 + 4,
-    "system": 1770 + 0 + 23,
+    "system": 1770 + 0 + 22,
     "verify": 3100 + 150 + 76,
 }
-FILES, TOTAL = 310, 45000 + 368 + 1171
+FILES, TOTAL = 310, 45000 + 368 + 1192
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -87,8 +87,7 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
         addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
         for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
             soft, hard = resource.getrlimit(kind)
-            finite = {limit, soft, hard} - {resource.RLIM_INFINITY}
-            resource.setrlimit(kind, (min(finite), hard))
+            resource.setrlimit(kind, (min({limit, soft, hard} - {resource.RLIM_INFINITY}), hard))
         try:
             sender.send(function(path))
         except FetiHomogError as error:
