@@ -113,15 +113,13 @@ def _of_result(directory: Path) -> ListedFibres:
     radii = [fibre.get("radius") for fibre in fibres]
     axes = [(r, r) if r else fibre.get("semi_axes") or unknown for r, fibre in zip(radii, fibres, strict=True)]
     a, b = np.array(axes, float).reshape(-1, 2).T
-    return ListedFibres(
-        np.array([cell["width"], cell["height"]]),
-        Ellipses.of(centres, a, b, np.array([fibre.get("angle") or 0.0 for fibre in fibres])),
-        tuple(fibre["phase"] for fibre in fibres),
-        np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
-        np.zeros(len(fibres)),
-        cell.get("origin", (0.0, 0.0)),
-        lacks_voids=bool(cell.get("porosity")),
-    )
+    angles = np.array([fibre.get("angle") or 0.0 for fibre in fibres])
+    ellipses = Ellipses.of(centres, a, b, angles)
+    phases = tuple(fibre["phase"] for fibre in fibres)
+    coatings = np.array([fibre.get("coating") or 0.0 for fibre in fibres])
+    cores, has_voids = np.zeros(len(fibres)), bool(cell.get("porosity"))
+    size, origin = np.array([cell["width"], cell["height"]]), cell.get("origin", (0.0, 0.0))
+    return ListedFibres(size, ellipses, phases, coatings, cores, origin, has_voids)
 
 
 def _of_cell(cell: cell_section.Cell) -> ListedFibres:

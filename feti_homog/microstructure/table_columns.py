@@ -140,9 +140,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
         # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
     # Where y points down, angles are still counter-clockwise in the picture.
-    values: dict[str, Callable[[float], float]] = {}
-    if not AXES_OF_PICTURES.isdisjoint(bare):
-        values["angle"] = lambda value: -value
+    values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
     columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}

@@ -66,8 +66,7 @@ def hint(value: Any) -> str:
     if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):
         return "; `feti-homog uncertainty` takes scatter"
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
-    is_nan = value != value
-    return MAGNITUDES if is_of_type and not is_nan and not is_number(value) else ""
+    return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""  # NaN differs from itself
 
 
 def is_number(value: Any) -> bool:

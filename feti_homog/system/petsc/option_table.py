@@ -36,6 +36,7 @@ def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
 
 
 PC_TYPES = "auto|none|lumped|dirichlet|influence"
+COLUMNS_HELP = "changed rows after which a new reference cell is factored; by default none below 2501 rows"
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
@@ -49,12 +50,7 @@ OPTIONS = (
     Option("feti_dual_operator", "auto|implicit|explicit", "auto", "triangular solves (natural coarse space) or dense"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
-    Option(
-        "feti_influence_columns",
-        "<integer>",
-        "1000",
-        "changed rows after which a new reference cell is factored; by default none below 2501 rows",
-    ),
+    Option("feti_influence_columns", "<integer>", "1000", COLUMNS_HELP),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
     Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace for them, in per cent"),
