@@ -64,8 +64,7 @@ class StatusSearch:
 
     def run(self, status: Status) -> Found:
         """Search by pivots, then by trial, then by continuation, until a search succeeds."""
-        result = self.by_pivots(status)
-        return result or self.by_trial(status) or self.by_continuation(status)
+        return self.by_pivots(status) or self.by_trial(status) or self.by_continuation(status)
 
     def by_pivots(self, status: Status, solves: int | None = None) -> Found:
         """Search by at most `solves` pivots.  Return the final statuses and x if the forces balance."""

@@ -108,7 +108,8 @@ class FaceSystem:
     def sign(self, status: Status, by_stress: Bool) -> int:
         """Return the sign of det M, see `status_system`, with given statuses; 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
-        return (self._turned(*rows) or self._system(*rows)).sign
+        followed = self._turned(*rows)
+        return self._system(*rows).sign if followed is None else followed.sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
         """Return `FollowedStatuses` with rows from `free_rows`; None at a tiny pivot, or while factoring is cheaper."""
@@ -128,11 +129,13 @@ class FaceSystem:
 
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) solved anew without accumulated rounding; with a free motion, x stays."""
-        return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
+        has_free_motion = self.sign(status, load.by_stress) == 0
+        return status, (x if has_free_motion else self.linear(status, load, x)[0])
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
         """Return whether no force drives a free motion, such as a fibre that turns in a hole."""
-        (free, slope), fixed = status_system.free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
+        free, slope = status_system.free_rows(status, self.friction, load.by_stress)
+        fixed = np.zeros(len(x))
         # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
         fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)

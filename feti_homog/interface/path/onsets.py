@@ -70,9 +70,8 @@ class Onset:
                 np.minimum.at(first, ray[is_convex], upper[is_convex])
                 rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
                 exact = np.full(len(used), np.inf)
-                exact[rivals] = bonds.at(rivals).crossing(
-                    start[rivals], along[rivals], np.zeros(len(rivals)), upper[rivals]
-                )
+                low = np.zeros(len(rivals))
+                exact[rivals] = bonds.at(rivals).crossing(start[rivals], along[rivals], low, upper[rivals])
             factors[loaded] = exact
         return factors.reshape(n, k)
 
