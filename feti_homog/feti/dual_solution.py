@@ -147,10 +147,10 @@ class ActiveJumps:
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
         torn = (d @ solution.strain)[:, None]
-        jump = torn - self.operator.apply(solution.lam[:, None])
+        lam, iterations, reason = solution.lam[:, None], solution.iterations, solution.reason
+        jump = torn - self.operator.apply(lam)
         scale = self.norms(self.projected(torn))
-        parts = solution.iterations, solution.reason, scale
-        return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]
+        return self.solutions(solution.strain[None], lam, jump, iterations, reason, scale)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:

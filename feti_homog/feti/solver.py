@@ -159,15 +159,16 @@ class FetiSolver:
         `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
         the intact compliance.  No subdomain is factored anew.  Raises like `preconditioner.soften` and `.activate`.
         """
-        changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
-        change = self.comm.allreduce(changed, MPI.BOR)
-        if change >= 2:
+        changes = np.array([(active != self.active.mask).any(), (compliance != self.operator.compliance).any()])
+        self.comm.Allreduce(MPI.IN_PLACE, changes, MPI.LOR)
+        rows_change, springs_change = changes
+        if springs_change:
             self.preconditioner.soften(compliance - self.intact_compliance)
             self.operator.compliance = compliance
-        if change % 2:
+        if rows_change:
             self.active.mask = active
             self.natural.activate(active)
-        if change:
+        if rows_change or springs_change:
             self.preconditioner.activate(active)
             self._units = []
 
@@ -215,7 +216,7 @@ class FetiSolver:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
             starts: (owned rows, k) initial multipliers.
         """
-        k, columns = len(strains), None if self.is_pulled else self._by_columns
+        k, columns = len(strains), (None if self.is_pulled else self._by_columns)
         if strains.shape[1] == len(self.problem.loads):
             strains = strains @ self.closure.T
             if self._units:
@@ -246,8 +247,9 @@ class FetiSolver:
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if has_jump.any():
             lam, applied, iterations, reason = krylov.solve(lam, right)
-            smallest, largest = (iterations and krylov.extreme_values) or (1.0, self.condition)
-            self.condition = max(self.condition, largest / smallest)
+            extremes = krylov.extreme_values if iterations else None
+            if extremes is not None:
+                self.condition = max(self.condition, extremes[1] / extremes[0])
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
         parts = lam * scale + balance, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
@@ -290,7 +292,7 @@ class FetiSolver:
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for `columns` load cases; the first call sets it up and is collective."""
         if columns not in self._krylov:
-            parts = self.jump_operator.vector, self.preconditioner, self.jumps, columns
-            self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)
+            vector, restarts = self.jump_operator.vector, self.adaptive is not None
+            self._krylov[columns] = Krylov(vector, self.preconditioner, self.jumps, columns, restarts)
             self._shells.callback(self._krylov[columns].destroy)
         return self._krylov[columns]

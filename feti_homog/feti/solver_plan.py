@@ -205,7 +205,7 @@ class SolverParts:
         sizes = np.array([n for part in comm.allgather([len(d) for d in operators.dofs]) for n in part])
         dense = comm.allreduce(sum(o.is_dense for o in operators.operators))
         lines = [
-            f"FETI: {len(sizes)} subdomain{'s' * (len(sizes) != 1)}, {dense} with dense boundary operators",
+            f"FETI: {len(sizes)} subdomain{'' if len(sizes) == 1 else 's'}, {dense} with dense boundary operators",
             f"  boundary dofs of a subdomain: {sizes.min()} to {sizes.max()}, mean {sizes.mean():.0f}",
             f"  kernels: {self.natural.kernel_dimension} rigid-body modes",
         ]

@@ -106,7 +106,8 @@ class ConstraintLayout:
             # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between the body means.
             # One body, or more than two bodies, cannot part and count as one body.
             sizes = np.diff(np.flatnonzero(code[:-1]))
-            k, contrasts = int(sizes.sum()), helmert(int(sizes.sum()))
+            k = int(sizes.sum())
+            contrasts = helmert(k)
             if len(sizes) == 2:
                 contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
             members = np.flatnonzero(group.ravel() == number)
@@ -158,9 +159,10 @@ class ConstraintLayout:
         # The length of a node is int N ds along the curve on both sides; half of both sides for linear elements.
         normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
         order = self.lattice.order
-        side, in_middle = order / self.lattice.intervals, shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
-        starts = (place - part * side for part in (1.0, 0.0, 0.5))
-        before, after, around = (side_lengths(normal, turn, start, order, side) for start in starts)
+        side = order / self.lattice.intervals
+        before, after = (side_lengths(normal, turn, start, order, side) for start in (place - side, place))
+        around = side_lengths(normal, turn, place - side / 2, order, side)
+        in_middle = shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
         on_edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
         return InterfaceNodes(
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
@@ -185,9 +187,8 @@ class ConstraintLayout:
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
         # Sharers are sorted inwards: the first sharer belongs to the outer body.
         outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
-        of_outer, of_inner = (
-            np.bincount(entity[shared.body == body[entity]], minlength=len(outer)) for body in (outer, inner)
-        )
+        of_outer = np.bincount(entity[shared.body == outer[entity]], minlength=len(outer))
+        of_inner = np.bincount(entity[shared.body == inner[entity]], minlength=len(inner))
         two = np.flatnonzero((outer != inner) & (of_outer + of_inner == shared.copies))
         e, p = expand(two, shared.nodes[two])
         row = self.first[e] + self.components * ((p + 1) * (shared.copies[e] - 1) - 1)

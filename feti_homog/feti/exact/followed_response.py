@@ -84,7 +84,8 @@ class FollowedResponse:
         self._factors[:n] = self._factors[slots]
         if n + more > capacity:
             wider = np.zeros((len(self._buffer), 2 * (n + more)), order="F")
-            wider[:, :n], self._buffer = self._buffer[:, :n], wider
+            wider[:, :n] = self._buffer[:, :n]
+            self._buffer = wider
             new = wider.shape[1] - capacity
             self._used, self._factors = np.pad(self._used, (0, new)), np.pad(self._factors, [(0, new), (0, 0)])
 
@@ -156,7 +157,7 @@ class FollowedResponse:
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
         """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
-        self._make_room(len(rows))
+        self._make_room_for_waiting(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
         outer = np.outer(root, root)
@@ -188,7 +189,7 @@ class FollowedResponse:
         which, B, growth = inverse
         self.rounding += np.finfo(float).eps * growth
         if len(which):
-            self._make_room(len(which))
+            self._make_room_for_waiting(len(which))
             s, difference, places = sign[which], np.take(columns, which, axis=1), rows[which] - self._first
             mine = np.flatnonzero((places >= 0) & (places < len(columns)))
             places = places[mine]
@@ -230,7 +231,7 @@ class FollowedResponse:
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
         self._count += k
 
-    def _make_room(self, k: int) -> None:
+    def _make_room_for_waiting(self, k: int) -> None:
         """Make room for `k` waiting columns."""
         if self._count + k > thresholds.WAITING_COLUMNS:
             self._apply_waiting()
@@ -240,8 +241,8 @@ class FollowedResponse:
         n, k = self._count, len(self._rows)
         if n and k and len(self._buffer):
             # In place: a separate product would take as much memory as all columns.
-            product = -1.0, self._waiting[:, :n], self._factors[:k, :n]
-            dgemm(*product, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
+            waiting, factors = self._waiting[:, :n], self._factors[:k, :n]
+            dgemm(-1.0, waiting, factors, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
         self._count = 0
 
 
