@@ -139,12 +139,12 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     size = scale * arrangement.size
     conics = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
     centres = scale * conics.centres % size + arrangement.origin
-    others: Mapping[str, Float] = {}
+    columns: Mapping[str, Float] = {}
     if cell.table is not None:
         centres = periodic_table.listed_centres(cell.table, cell.window, centres, arrangement.row)
-        columns = {name: values[arrangement.row] for name, values in cell.table.columns.items()}
-        others = shapes.columns_without_tips(columns)
+        rows = {name: values[arrangement.row] for name, values in cell.table.columns.items()}
+        columns = shapes.columns_without_tips(rows)
     ellipses = Ellipses(centres, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
-    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, others)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, columns)

@@ -101,8 +101,8 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress: S11, ..., von_mises or principal")
     plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
     plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
-    words = "vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd"
-    fields.add_argument("--format", choices=("vtkhdf", "vtu"), default="vtkhdf", help=words)
+    format_help = "vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd"
+    fields.add_argument("--format", choices=("vtkhdf", "vtu"), default="vtkhdf", help=format_help)
     words = "program that reads the card (required): abaqus, calculix, ansys, moose, csv"
     export.add_argument("--format", default="", metavar="PROGRAM", help=words)
     export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
@@ -142,10 +142,10 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
     scatter = _command(commands, "studies.uncertainty", "propagate the scatter of numbers to results", SCATTER_HELP)
     scatter.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with uncertain numbers")
     scatter.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the runs")
-    words = "ranks for each case; groups of R ranks run cases at the same time (by default R is all ranks)"
+    ranks_help = "ranks for each case; groups of R ranks run cases at the same time (by default R is all ranks)"
     for parser in (sweep, fit, scatter):
         parser.add_argument("--retry", action="store_true", help="compute failed cases again")
-        parser.add_argument("--ranks-per-case", type=integer, metavar="R", help=words)
+        parser.add_argument("--ranks-per-case", type=integer, metavar="R", help=ranks_help)
         parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
 
 

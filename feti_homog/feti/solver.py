@@ -128,7 +128,8 @@ class FetiSolver:
     @cached_property
     def _torn_displacement(self) -> Float:
         """Compute the displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
-        operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
+        operators = self.interface_operators
+        u = operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 

@@ -33,15 +33,14 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     numbers, counts = np.unique(image, return_counts=True)
     names = list(map(str, numbers.tolist()))
     shares = [f"{name}: {share:.3g} %" for name, share in zip(names, 100 * counts / image.size, strict=True)]
-    others = ", ..." if len(names) > MOST_FAULTS else ""
-    listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}{others}"
+    listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}{', ...' if len(names) > MOST_FAULTS else ''}"
     faults = []
     if unnamed := [name for name in names if name not in labels]:
-        others = ", ..." if len(unnamed) > 3 else ""
+        few = ", ".join(unnamed[:3]) + (", ..." if len(unnamed) > 3 else "")
         way = ""
         if len(unnamed) > 16:
             way = "; turn grey values into labels by a threshold, or into a table by fibres --image"
-        faults.append(f"[cell] labels: no phase for {', '.join(unnamed[:3])}{others}; {listed}{way}")
+        faults.append(f"[cell] labels: no phase for {few}; {listed}{way}")
     for name in sorted(labels.keys() - set(names)):
         faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
     if faults:

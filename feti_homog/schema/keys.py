@@ -150,9 +150,9 @@ class TableReader:
         for name in unknown[:worded]:
             faults[name] = f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
         for name, entry in keys.items():
-            words = entry.fault(name, table)
-            if words:
-                faults[name] = words
+            fault = entry.fault(name, table)
+            if fault:
+                faults[name] = fault
         self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faults.items()]
         good = {name: value for name, value in table.items() if name not in faults}
         values = {k: self._stored(keys[k].type, value, section, f"{prefix}{k}") for k, value in good.items()}

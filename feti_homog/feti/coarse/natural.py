@@ -83,7 +83,8 @@ class NaturalCoarseSpace:
         if not self.kernel_dimension:
             return
         # Rows of Z: unconstrained modes whose first subdomain is on this rank.
-        modes, first = self.unconstrained_modes, self.unconstrained_modes.indices[self.unconstrained_modes.indptr[:-1]]
+        modes = self.unconstrained_modes
+        first = modes.indices[modes.indptr[:-1]]
         Z = modes[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
         self.unknowns = np.union1d(self._reaching, Z.indices).astype(np.int64)
         self._G = self.G_active[:, self.unknowns].tocsr()

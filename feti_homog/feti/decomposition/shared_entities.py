@@ -223,7 +223,6 @@ def share_entities(
     own_constraints = int(constraints.sum())
     begin = comm.exscan(own_constraints) or 0
     numbers = begin + np.cumsum(constraints) - constraints
-    # The owner of an entity sends its number and geometry to the other sharers.
     rank, entity = table.rank[sharers.sharer], np.repeat(np.arange(len(owner)), sharers.copies)
     mine = (owner == comm.rank)[entity]
     entity, to = np.divmod(np.unique(entity[mine] * comm.size + rank[mine]), comm.size)

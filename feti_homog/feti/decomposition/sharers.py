@@ -80,7 +80,6 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     shared = copies[entity] > 1
     code, subdomain = code[shared], subdomain[shared]
     code, first, copies = np.unique(code, return_index=True, return_counts=True)
-    # Each rank with a sharer of an entity receives all sharers of this entity.
     entity = np.repeat(np.arange(len(code)), copies)
     entity, to = np.divmod(np.unique(entity * comm.size + table.rank[subdomain]), comm.size)
     code, count = distributed_arrays.exchange(comm, to, code[entity], copies[entity])

@@ -50,8 +50,8 @@ class SectionValues:
         """Return the values (s,) in all s sections, for the factor 1, equal on every rank; (inf,) without sections."""
         values = []
         for bond in self.bonds:
-            given = [getattr(bond, name) for name in (key, *more)]
-            values.append(next((value for value in given if value is not None), math.inf))
+            candidates = [getattr(bond, name) for name in (key, *more)]
+            values.append(next((value for value in candidates if value is not None), math.inf))
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:

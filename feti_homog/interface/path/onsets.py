@@ -107,17 +107,17 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     damaged = interface.damaged(state.bonds)
     in_contact = (state.status == CLOSED) | damaged
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
-    before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
-    shares = [shares_to_zero(before, after, tension[in_contact])]
+    force, force_at_end = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(force, force_at_end, tension[in_contact])]
     # Without contact, faces may overlap.
     is_open = (state.status == OPEN) & interface.contact
-    before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
+    gap, gap_at_end = state.solution.jump[nodes.row], end.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
     if interface.contact and solver.natural.unconstrained_modes.shape[1]:
         bodies = FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise)
-        shares.append(bodies.admissible_share(before, after))
+        shares.append(bodies.admissible_share(gap, gap_at_end))
     else:
-        shares.append(shares_to_zero(before[is_open], after[is_open], noise))
+        shares.append(shares_to_zero(gap[is_open], gap_at_end[is_open], noise))
     first = np.min(shares, axis=0)
     solver.comm.Allreduce(MPI.IN_PLACE, first, MPI.MIN)
     return float(first[0]), float(first[1])

@@ -209,12 +209,12 @@ def petsc_words(options: Mapping[str, str]) -> list[str]:
 
     Flags that PETSc reads itself are set or left out.  False flags of the solver stay: they override the case.
     """
-    words = []
+    argv = []
     for name, text in options.items():
         value = flag_value(text) if is_own_flag(name) else text
         if value is not None:
-            words += [f"-{name}", value] if value else [f"-{name}"]
-    return words
+            argv += [f"-{name}", value] if value else [f"-{name}"]
+    return argv
 
 
 def _is_petsc(word: str) -> bool:

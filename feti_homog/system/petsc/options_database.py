@@ -98,11 +98,10 @@ NO_SUCH_METHOD = "requested KSP type"
 class _Identity:
     """The identity as a 1 x 1 shell matrix and shell preconditioner, in place of the dual problem."""
 
-    def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def mult(self, shell: PETSc.Object, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)
 
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        x.copy(y)
+    apply = mult
 
 
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
