@@ -80,7 +80,7 @@ class CoulombLeg(Leg):
     def _given(self, share: float, x: Float) -> Prescribed:
         """Return the prescribed load at a leg fraction, with the slips in scaled x."""
         load = self._load_at(share)
-        return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
+        return Prescribed(load.by_stress, self.sliding.given(load), x[self.sliding.faces.slips])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
         """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""

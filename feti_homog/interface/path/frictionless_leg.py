@@ -93,8 +93,7 @@ class FrictionlessLeg(Leg):
         """
         cell, before, start = self.cell, self._state, self._share
         try:
-            # The solutions at the end of the leg with fixed contact states.
-            end = cell.linear(self.end, before.bonds, before.multipliers)
+            end = cell.linear(self.end, before.bonds, before.multipliers)  # with fixed contact states
         except NotCarriedError:
             beyond = min(start + SAME_SHARE, 1.0)
             touching = self._solve(beyond, before.bonds, before.multipliers)
