@@ -230,16 +230,17 @@ class FetiSolver:
         if self.is_pulled:
             balance = self.natural.balancing(-self._pushes @ strains.T)
             torn_jump -= self.operator.apply(balance)
-        torn = self.jumps.norms(torn_jump)
         right = self.jumps.projected(torn_jump)
         jump = self.jumps.norms(right)
         # A load without a jump on the active rows has no multipliers.
-        rounding = self.jumps.rounding(self._torn_displacement, strains.T, jump, torn)
+        rounding = self.jumps.rounding(self._torn_displacement, strains.T, jump, self.jumps.norms(torn_jump))
         has_jump = jump > rounding
         scale = np.where(has_jump, jump, 1.0)
         right = np.where(has_jump, right, 0.0) / scale
-        E, forces = np.where(has_jump, strains.T, 0.0) / scale, self.preconditioner.closing_forces
-        closing = forces(right) if columns is None else columns.closing(self.d, E, has_jump / scale)
+        if columns is None:
+            closing = self.preconditioner.closing_forces(right)
+        else:
+            closing = columns.closing(self.d, np.where(has_jump, strains.T, 0.0) / scale, has_jump / scale)
         closing = self.natural.project(closing)
         krylov.test.jump_scale = float(np.sqrt(has_jump.sum()))
         krylov.test.force_scale = float(np.linalg.norm(self.jumps.norms(closing)))
@@ -253,8 +254,8 @@ class FetiSolver:
                 self.condition = max(self.condition, extremes[1] / extremes[0])
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
-        parts = lam * scale + balance, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
-        solutions = self.jumps.solutions(strains, *parts)
+        lam, jumps = lam * scale + balance, torn_jump - applied * scale
+        solutions = self.jumps.solutions(strains, lam, jumps, iterations, reason, np.maximum(jump, rounding))
         if columns is not None:
             columns.record(solutions if has_jump.all() else [], self.d)
         return solutions
@@ -272,8 +273,8 @@ class FetiSolver:
 
     def displacement(self, solution: DualSolution) -> Float:
         """Complete a solution, and compute u* (local dofs,), Eq. (34); may factor interiors.  Collective."""
-        u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
-        return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
+        u = self.boundary_displacement(solution)
+        return np.concatenate([u[:0], *(self.extended(i, u, solution.strain) for i in range(len(self.subdomains)))])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
         """Extend u (boundary dofs, k) to all dofs of the subdomain `place`, by `InterfaceOperators.extend`."""

@@ -274,7 +274,6 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
     stiffness = solver.torn_stiffness[np.ix_(unknown, unknown)]
     resistance = open_jumps / np.outer(scales[0], scales[0]) + stiffness / np.outer(scales[1], scales[1])
-    values, vectors = np.linalg.eigh(resistance)
-    # The eigenvalues are squares of sizes.
+    values, vectors = np.linalg.eigh(resistance)  # the eigenvalues are squares of sizes
     undetermined[unknown] = (np.abs(vectors[:, values < NEGLIGIBLE**2]) > NEGLIGIBLE).any(axis=1)
     return np.asarray(solver.comm.bcast(undetermined))

@@ -131,8 +131,7 @@ def kernels_and_soft_modes(
     """
     parts = list(zip(blocks, neighbours.common, strict=True))
     problems = mpi_errors.agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
-    # Contributions of the neighbours to M^-1, on common rows.
-    received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
+    received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]  # the neighbours' parts of M^-1, on common rows
 
     def messages() -> Iterator[tuple[int, int, Float32]]:
         for i, problem in enumerate(problems):

@@ -175,7 +175,7 @@ class GramMatrix:
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]
-        at = np.arange(count.sum()) + np.repeat(self._first[changed] - np.cumsum(count) + count, count)
+        at = distributed_arrays.ranges(self._first[changed], count)
         products = self._product[at] * np.repeat((active - self._active)[changed], count)
         self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
         self._active = active.copy()
@@ -190,9 +190,8 @@ class GramMatrix:
         rows, numbers, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for members, places, blocks, eigenvalues, vectors in self._groups:
             now = padded[places]
-            # A broken bond changes one or two groups.
             changed = np.flatnonzero((now != blocks).any(axis=(1, 2)))
-            if len(changed):
+            if len(changed):  # a broken bond changes one or two groups
                 eigenvalues[changed], vectors[changed] = np.linalg.eigh(now[changed])
                 blocks[changed] = now[changed]
             which, mode = np.nonzero(eigenvalues <= tolerance[members].max(axis=1, keepdims=True))

@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, side_lengths
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, refinement
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -76,8 +77,7 @@ class ConstraintLayout:
         copies = shared.copies
         self.count = components * shared.nodes * (copies - 1)
         self.first = np.cumsum(self.count) - self.count
-        shift: Int = np.repeat(components * shared.first - self.first, self.count)
-        self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
+        self.rows = distributed_arrays.ranges(components * shared.first, self.count)
         self.dofs = np.cumsum([0, *(components * s.mesh.n_classes for s in subdomains)])
         self.base = np.full(len(shared.sharer), -1)
         entity = np.repeat(np.arange(len(shared.key)), copies)
@@ -212,6 +212,4 @@ class ConstraintLayout:
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
     """Return the entity and the position p on it for every fine node; `entities` (e,) have `nodes` (e,) fine nodes."""
-    ends = np.cumsum(nodes)
-    p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
-    return np.repeat(entities, nodes), p
+    return np.repeat(entities, nodes), distributed_arrays.ranges(np.zeros_like(nodes), nodes)

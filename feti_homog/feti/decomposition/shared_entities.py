@@ -75,7 +75,8 @@ def interface_geometry(
     # The last sharer of an edge between two bodies is a piece of the fibre.
     edges = np.flatnonzero(sharers.is_edge & can_part)
     mesh = meshes.whole
-    edge, subdomain_of = np.searchsorted(mesh.edge_keys, sharers.key[edges]), np.full(len(mesh.edge_keys), -1)
+    edge = np.searchsorted(mesh.edge_keys, sharers.key[edges])
+    subdomain_of = np.full(len(mesh.edge_keys), -1)
     subdomain_of[edge] = sharers.innermost[edges]
     sides = mesh.edge_class[mesh.triangle_edges]
     triangle, k = np.nonzero(subdomain_of[sides] == meshes.index[meshes.member][:, None])

@@ -175,11 +175,14 @@ class FollowedResponse:
         """
         columns, values = self._present(rows)
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
-        if len(loaded := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)]):
-            rows, none = np.concatenate([rows, loaded]), np.zeros(len(loaded))
-            sign, gain = np.concatenate([sign, none + 1.0]), np.concatenate([gain, none])
+        is_loaded = (np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)
+        loaded = self.pins[is_loaded]
+        if len(loaded):
+            rows = np.concatenate([rows, loaded])
+            sign, gain = np.append(sign, np.ones(len(loaded))), np.append(gain, np.zeros(len(loaded)))
             columns, values = self._present(rows)
-        if (k := len(rows)) > thresholds.WAITING_COLUMNS:
+        k = len(rows)
+        if k > thresholds.WAITING_COLUMNS:
             return False
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gain, 0.0))
         inverse = self._comm.bcast(_regular(block, sign, self._stiffness[rows], pivot))
@@ -209,8 +212,9 @@ class FollowedResponse:
             places = self.pins - self._first
             self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
             # Springs of pins have C_0, like springs of inactive rows.
-            if len(loose := loose[gain[loose] != 0.0]):
-                return self.soften(rows[loose], gain[loose], pivot)
+            softer = loose[gain[loose] != 0.0]
+            if len(softer):
+                return self.soften(rows[softer], gain[softer], pivot)
         return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:

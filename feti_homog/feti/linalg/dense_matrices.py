@@ -42,7 +42,8 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     matrix.data *= scale
     A = sequential(matrix)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    index_set, pc = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF), PETSc.PC()
+    index_set = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    pc = PETSc.PC()
     try:
         for workspace in MORE_WORKSPACE:
             pc.destroy()

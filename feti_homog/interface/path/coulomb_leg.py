@@ -102,8 +102,7 @@ class CoulombLeg(Leg):
         self._mean, faces = begin.last, sliding.faces
         status, after = self._on_root(faces.search, status, faces.all_allowed(), self._given(self._share, x), x)
         lost, heat = (loss / self.cell.area for loss in faces.losses(status, x, after))
-        # Softening bonds lose the energy of their springs.
-        lost += begin.stretched - sliding.stretched(x)
+        lost += begin.stretched - sliding.stretched(x)  # softening bonds lose the energy of their springs
         lost += sliding.released_along(begin.last, sliding.macroscopic(after))
         self._go_straight(status, after, lost - heat, heat, begin.broken)
         self._first = True

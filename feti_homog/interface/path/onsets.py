@@ -109,8 +109,7 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
     force, force_at_end = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
     shares = [shares_to_zero(force, force_at_end, tension[in_contact])]
-    # Without contact, faces may overlap.
-    is_open = (state.status == OPEN) & interface.contact
+    is_open = (state.status == OPEN) & interface.contact  # without contact, faces may overlap
     gap, gap_at_end = state.solution.jump[nodes.row], end.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
     if interface.contact and solver.natural.unconstrained_modes.shape[1]:
