@@ -55,24 +55,24 @@ class Onset:
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
-        used, factors = self.utilisation(direction.reshape(-1, c), node), np.full(n * k, np.inf)
+        along = direction.reshape(-1, c)
+        used, factors = self.utilisation(along, node), np.full(n * k, np.inf)
         loaded = np.flatnonzero(used > np.broadcast_to(noise.reshape(n, -1), (n, k)).ravel())
         if before is None:
             factors[loaded] = 1.0 / used[loaded]
-        else:
-            nodes, along = node[loaded], direction.reshape(-1, c)[loaded]
-            bonds, start, ray, used = self.bonds.at(nodes), before[nodes], ray[loaded], used[loaded]
-            exact = bonds.first_factor(start, along)
-            if exact is None:
-                # Bisection, without bonds that break after another bond under the same ray.
-                lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
-                first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
-                np.minimum.at(first, ray[is_convex], upper[is_convex])
-                rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
-                exact = np.full(len(used), np.inf)
-                low = np.zeros(len(rivals))
-                exact[rivals] = bonds.at(rivals).crossing(start[rivals], along[rivals], low, upper[rivals])
-            factors[loaded] = exact
+            return factors.reshape(n, k)
+        ray, node, along, used = ray[loaded], node[loaded], along[loaded], used[loaded]
+        bonds, start = self.bonds.at(node), before[node]
+        exact = bonds.first_factor(start, along)
+        if exact is None:
+            # Bisection, without bonds that break after another bond under the same ray.
+            lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
+            first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
+            np.minimum.at(first, ray[is_convex], upper[is_convex])
+            rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+            low, exact = np.zeros(len(rivals)), np.full(len(used), np.inf)
+            exact[rivals] = bonds.at(rivals).crossing(start[rivals], along[rivals], low, upper[rivals])
+        factors[loaded] = exact
         return factors.reshape(n, k)
 
 
