@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).parents[2] / "feti_homog"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
 # begun runs, messages (of meshes, too), starts and steps of fits, soft springs, checks of checkpoints; the third:
-# conductivity, images, boundaries, ranges of numbers in results that verify compared before.
+# conductivity, images, boundaries, ranges of numbers in results that verify compared before, plain statements.
 LINES = {
     ".": 470,
     "analysis": 3000 + 115 + 89,
