@@ -33,11 +33,12 @@ def table(source: Path) -> str:
     with np.errstate(invalid="ignore"):  # frames are NaN for other shapes
         is_round = ellipses.are_round
     a, b = np.where(np.isnan(fibres.coatings), np.nan, ellipses.semi_axes.T)  # without a thickness of the coating
-    columns = dict(zip("xy", map(_words, ellipses.centres.T), strict=True))
-    columns["radius"] = _words(np.where(is_round, a, np.nan))
+    x, y = ellipses.centres.T
+    columns = {"x": _words(x), "y": _words(y), "radius": _words(np.where(is_round, a, np.nan))}
     columns["phase"] = list(fibres.phases)
     if not (is_round | np.isnan(a)).all():
-        columns |= {name: _words(np.where(is_round, np.nan, of)) for name, of in zip("ab", (a, b), strict=True)}
+        columns["a"] = _words(np.where(is_round, np.nan, a))
+        columns["b"] = _words(np.where(is_round, np.nan, b))
         columns["angle"] = _words(np.where(is_round, np.nan, ellipses.angles))
     if fibres.coatings.any():
         columns["coating"] = _words(fibres.coatings / fibres.radii)
@@ -48,9 +49,13 @@ def table(source: Path) -> str:
         columns["inner_radius"] = _words(fibres.cores)
     columns["number"] = ["" if name == phase_names.VOID else str(k) for k, name in enumerate(fibres.phases, 1)]
     rows = map(",".join, zip(*columns.values(), strict=True))
-    centres, reach = ellipses.centres[~np.isnan(a)], ellipses.longest[~np.isnan(a), None]
-    low, high = (centres + reach).min(axis=0, initial=np.inf), (centres - reach).max(axis=0, initial=-np.inf)
-    (width, height), (left, bottom) = fibres.size.tolist(), np.clip(fibres.origin, high - fibres.size, low).tolist()
+    # Every fibre reaches into the cell.
+    has_axes = ~np.isnan(a)
+    centres, reach = ellipses.centres[has_axes], ellipses.longest[has_axes, None]
+    least_corner = (centres - reach).max(axis=0, initial=-np.inf) - fibres.size
+    largest_corner = (centres + reach).min(axis=0, initial=np.inf)
+    left, bottom = np.clip(fibres.origin, least_corner, largest_corner).tolist()
+    width, height = fibres.size.tolist()
     size = f"# width = {width!r}, height = {height!r}, left = {left!r}, bottom = {bottom!r}"
     return "\n".join([size, ",".join(columns), *rows])
 
@@ -105,17 +110,16 @@ def _of_result(directory: Path) -> ListedFibres:
         return _of_cell(cases.parse(document["case"], directory).cell)
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
-    axes = [(r, r) if (r := fibre.get("radius")) else fibre.get("semi_axes") or unknown for fibre in fibres]
+    radii = [fibre.get("radius") for fibre in fibres]
+    axes = [(r, r) if r else fibre.get("semi_axes") or unknown for r, fibre in zip(radii, fibres, strict=True)]
     a, b = np.array(axes, float).reshape(-1, 2).T
-    return ListedFibres(
-        np.array([cell["width"], cell["height"]]),
-        Ellipses.of(centres, a, b, np.array([fibre.get("angle") or 0.0 for fibre in fibres])),
-        tuple(fibre["phase"] for fibre in fibres),
-        np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
-        np.zeros(len(fibres)),
-        cell.get("origin", (0.0, 0.0)),
-        lacks_voids=bool(cell.get("porosity")),
-    )
+    angles = np.array([fibre.get("angle") or 0.0 for fibre in fibres])
+    ellipses = Ellipses.of(centres, a, b, angles)
+    phases = tuple(fibre["phase"] for fibre in fibres)
+    coatings = np.array([fibre.get("coating") or 0.0 for fibre in fibres])
+    cores, has_voids = np.zeros(len(fibres)), bool(cell.get("porosity"))
+    size, origin = np.array([cell["width"], cell["height"]]), cell.get("origin", (0.0, 0.0))
+    return ListedFibres(size, ellipses, phases, coatings, cores, origin, has_voids)
 
 
 def _of_cell(cell: cell_section.Cell) -> ListedFibres:
@@ -135,11 +139,12 @@ def _of_cell(cell: cell_section.Cell) -> ListedFibres:
     size = scale * arrangement.size
     conics = shapes.elliptic(arrangement.outlines).grown(arrangement.walls)
     centres = scale * conics.centres % size + arrangement.origin
+    columns: Mapping[str, Float] = {}
     if cell.table is not None:
         centres = periodic_table.listed_centres(cell.table, cell.window, centres, arrangement.row)
+        rows = {name: values[arrangement.row] for name, values in cell.table.columns.items()}
+        columns = shapes.columns_without_tips(rows)
     ellipses = Ellipses(centres, scale * conics.frames)
     coatings = scale * (arrangement.coating - arrangement.walls)
     cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
-    columns = {} if cell.table is None else cell.table.columns
-    others = shapes.columns_without_tips({name: of[arrangement.row] for name, of in columns.items()}) if columns else {}
-    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, others)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, arrangement.origin, False, columns)

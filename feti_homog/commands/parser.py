@@ -21,6 +21,7 @@ EXPORT_HELP = (
     'Print the constants of a stiffness or envelope in plane = "generalized", or a conductivity, as a material card. '
     "Axis 1 of the card is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
 )
+FIELDS_HELP = "write the states of a result, with strains, von Mises and principal stresses, for VTK"
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
     "result.h5, by independent elements; print a line for each law, with its largest violation and limit. Exit code 3 "
@@ -86,11 +87,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     of_result = [
         _command(commands, "products.plot", "draw the pictures of a results folder again"),
         _command(commands, "products.report", "write report.html, one page with everything in a results folder"),
-        _command(
-            commands,
-            "products.fields",
-            "write the states of a result, with strains, von Mises and principal stresses, for VTK",
-        ),
+        _command(commands, "products.fields", FIELDS_HELP),
         _command(commands, "products.export", "print a result as a material card", EXPORT_HELP),
         _command(commands, "verify.verify", "check from its files alone that a result obeys its laws", VERIFY_HELP),
     ]
@@ -104,12 +101,8 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
     plot.add_argument("--component", choices=stresses, metavar="NAME", help="stress: S11, ..., von_mises or principal")
     plot.add_argument("--size", type=size, metavar="WxH", help="width and height in centimetres, such as 9x7")
     plot.add_argument("--title", metavar="TEXT", help='title of the pictures; "" for none')
-    fields.add_argument(
-        "--format",
-        choices=("vtkhdf", "vtu"),
-        default="vtkhdf",
-        help="vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd",
-    )
+    format_help = "vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd"
+    fields.add_argument("--format", choices=("vtkhdf", "vtu"), default="vtkhdf", help=format_help)
     words = "program that reads the card (required): abaqus, calculix, ansys, moose, csv"
     export.add_argument("--format", default="", metavar="PROGRAM", help=words)
     export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
@@ -149,14 +142,10 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
     scatter = _command(commands, "studies.uncertainty", "propagate the scatter of numbers to results", SCATTER_HELP)
     scatter.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with uncertain numbers")
     scatter.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the runs")
+    ranks_help = "ranks for each case; groups of R ranks run cases at the same time (by default R is all ranks)"
     for parser in (sweep, fit, scatter):
         parser.add_argument("--retry", action="store_true", help="compute failed cases again")
-        parser.add_argument(
-            "--ranks-per-case",
-            type=integer,
-            metavar="R",
-            help="ranks for each case; groups of R ranks run cases at the same time (by default R is all ranks)",
-        )
+        parser.add_argument("--ranks-per-case", type=integer, metavar="R", help=ranks_help)
         parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
 
 

@@ -67,8 +67,10 @@ def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
         circles, text = mpi_errors.on_root(comm, micrograph.fibres, arguments.image, arguments.pixel)
     if arguments.out is None:
         mpi_errors.on_root_only(comm, standard_streams.print_product, text)
-    elif (path := mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
+        return
+    path = mpi_errors.on_root_only(comm, output_folder.write_product, arguments.out, text)
+    if path is not None:
         standard_streams.say(str(path))
-    if arguments.out is not None and arguments.image is not None:
+    if arguments.image is not None:
         picture = arguments.image, circles, arguments.pixel, arguments.out
         mpi_errors.on_root_only(comm, lambda: standard_streams.say(micrograph.draw(*picture)))

@@ -27,7 +27,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
-    if document.keys() & {*sections.FIT_SECTIONS}:
+    if not document.keys().isdisjoint(sections.FIT_SECTIONS):
         text = mpi_errors.on_root(comm, fit_file.parse, document, arguments.case.parent).describe(comm)
     elif mpi_errors.on_root(comm, uncertainty.is_study, document):
         text = mpi_errors.on_root(comm, uncertainty.parse, document, arguments.case.parent).describe(comm)

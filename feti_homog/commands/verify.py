@@ -22,8 +22,9 @@ def verify(words: Sequence[str]) -> int:
         arguments = command_parser().parse_args(words)
         directory = output_folder.result_folder(arguments.directory)
         output_folder.refuse_begun(directory)
-        if os.path.isfile(path := directory / "result.h5"):
-            field_guard.require_own(path)
+        fields = directory / "result.h5"
+        if os.path.isfile(fields):
+            field_guard.require_own(fields)
         outcome = certificate.verify(directory)
         if prints:
             standard_streams.print_product(json.dumps(outcome.document, indent=1) if arguments.json else outcome.text)

@@ -42,19 +42,21 @@ class ArcSides:
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # On side k, from vertex k to the next vertex, the barycentric coordinate of the third vertex is zero.
-        fine, side = np.nonzero(np.roll(is_zero.all(axis=0), 1, axis=2).transpose(2, 0, 1))[1:]
+        _, fine, side = np.nonzero(np.roll(is_zero.all(axis=0), 1, axis=2).transpose(2, 0, 1))
         fine, side = fine.reshape(3, -1), side.reshape(3, -1)
         n = fine.shape[1]
         edges = np.cumsum([0, *(len(submesh.turns) for submesh in submeshes)])
         numbers = [submesh.triangle_edges + first for submesh, first in zip(submeshes, edges, strict=False)]
-        triangle_edges, turns = np.concatenate(numbers), np.concatenate([submesh.turns for submesh in submeshes])
+        triangle_edges = np.concatenate(numbers)
+        turns = np.concatenate([submesh.turns for submesh in submeshes])
         centres = np.concatenate([submesh.circles[:, :2] for submesh in submeshes])
         coarse, k = np.nonzero(turns[triangle_edges] > 0)
         element = (coarse[:, None] * len(corners) + fine[k]).ravel()
         side, edge = side[k].ravel(), np.repeat(triangle_edges[coarse, k], n)
         triangles = body.triangles[element]
-        middle = [3 + side] if lattice.order == 2 else []
-        nodes = np.stack([triangles[np.arange(len(triangles)), j] for j in (side, *middle, (side + 1) % 3)], axis=1)
+        following = (side + 1) % 3
+        places = [side, following] if lattice.order == 1 else [side, 3 + side, following]
+        nodes = np.stack([triangles[np.arange(len(triangles)), j] for j in places], axis=1)
         points, turn = body.points[nodes], turns[edge] / n
         spokes = points - centres[edge, None]
         doubled = _cross(spokes[:, 0], spokes[:, -1])
@@ -64,7 +66,7 @@ class ArcSides:
         # On an arc, the vector y from the centre obeys y'' = -turn^2 y.
         cosine = np.cos(turn)[:, None]
         first, last = spokes[:, -1] - cosine * spokes[:, 0], cosine * spokes[:, -1] - spokes[:, 0]
-        tangents = [first, *([last + first] if lattice.order == 2 else []), last]
+        tangents = [first, last] if lattice.order == 1 else [first, last + first, last]
         units = [t / np.hypot(*t.T)[:, None] for t in tangents]
         normals = np.stack([np.column_stack([t[:, 1], -t[:, 0]]) for t in units], axis=1)
         at_void = np.concatenate([submesh.at_void[submesh.edge_class] for submesh in submeshes])
@@ -109,8 +111,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     tractions = np.diff(_along(stress[:, :, body.problem.voigt], sides.normals), n=order, axis=1)[:, 0]
     imposed = np.einsum("cdk,fpd->fpck", macroscopic, sides.points)
     u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
-    weights = h[:, 0] / {1: 12, 2: 60}[order]
-    interpolation = _summed(weights, tractions, u)
+    interpolation = _summed(h[:, 0] / (12 if order == 1 else 60), tractions, u)
     return -np.asarray(rate + interpolation + interpolation.T)
 
 

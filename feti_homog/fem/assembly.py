@@ -57,7 +57,8 @@ def assemble(
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
-    couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
+    couples = np.empty((len(mesh.nodes), len(macro.rows), c * c))
+    loads = np.empty((*mesh.nodes.shape, 2))
     stiffnesses = laws.reshape(-1, *laws.shape[-2:])
     Q, slopes, areas = np.zeros((c * n, laws.shape[-1])), np.zeros((n, 2)), np.zeros(len(stiffnesses))
     for number, (L, is_mixed) in enumerate(zip(stiffnesses, np.broadcast_to(mixed, len(stiffnesses)), strict=True)):

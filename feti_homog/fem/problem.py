@@ -39,7 +39,7 @@ class Problem:
     @property
     def stresses(self) -> int:
         """Return the number of loads that do work on stresses: all but the temperature."""
-        return len(self.loads) - ("temperature" in self.loads)
+        return sum(load != "temperature" for load in self.loads)
 
     @cached_property
     def voigt(self) -> Int:

@@ -50,7 +50,7 @@ def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
     The second result is the quadrature weights times the Jacobian determinant (e, q).  `with_bubble` adds the bubble.
     """
     nodes = corners.shape[1]
-    reference, weights = quadrature(nodes + with_bubble)
+    reference, weights = quadrature(nodes + 1 if with_bubble else nodes)
     (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference[:, :nodes], (1, 1)), (1, 3), (0, 1))
     determinant = xr * ys - yr * xs
     by_r, by_s = np.moveaxis(reference, 2, 0)
@@ -163,12 +163,11 @@ class MixedElements:
 
         K_(a i)(b j) = int mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """
-        (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
+        first, shear = self.lame
+        e, q, a, _ = self.gradients.shape
         flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
-        weighted, projected = (
-            (weights * field[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
-            for field in (self.gradients, self.projected)
-        )
+        weighted = (weights * self.gradients[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
+        projected = (weights * self.projected[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
         products = (weighted @ flat).reshape(e, -1, 2, a, 2)
         K = shear * products.transpose(0, 1, 4, 3, 2)
         along = shear * (products[:, :, 0, :, 0] + products[:, :, 1, :, 1])

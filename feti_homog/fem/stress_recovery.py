@@ -106,9 +106,9 @@ class RecoveredStress:
     @cached_property
     def elements(self) -> list[ElementStresses]:
         """Return the element stresses at the integration points, in chunks."""
-        at_once, size = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE, len(self.triangles)
-        parts = (slice(first, min(first + at_once, size)) for first in range(0, size, at_once))
-        return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
+        at_once, compute = (LINEAR_AT_ONCE, self._uniform) if self.order == 1 else (ELEMENTS_AT_ONCE, self._varying)
+        size = len(self.triangles)
+        return [compute(slice(first, min(first + at_once, size))) for first in range(0, size, at_once)]
 
     def _varying(self, part: slice) -> ElementStresses:
         """Compute the stresses at the integration points in quadratic elements."""
@@ -122,7 +122,8 @@ class RecoveredStress:
             (e, a, c, k), q = u.shape, g.shape[1]
             flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
             gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
-            for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
+            for number in range(m):
+                i, d = np.nonzero(self.problem.voigt == number)
                 strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
             stress = self.L[:m, :m] @ strain
         points = shape_functions(6, barycentric(6)) @ corners
@@ -131,9 +132,9 @@ class RecoveredStress:
     def _uniform(self, part: slice) -> ElementStresses:
         """Compute the uniform stresses in linear elements, at the element centres."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
-        (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
+        x, y = (np.take(row, triangles) for row in self._coordinates)
         by_node = self.u.reshape(len(self.u), -1).T.copy()
-        zero, first, second = (np.take(by_node, row, axis=1) for row in at)
+        zero, first, second = (np.take(by_node, row, axis=1) for row in np.take(self.node_class, triangles))
         first -= zero
         second -= zero
         (x1, x2), (y1, y2) = x[1:] - x[0], y[1:] - y[0]
@@ -214,7 +215,8 @@ class RecoveredStress:
                 # With the values d_i of the linear difference d at the vertices, and their sum s:
                 # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
                 e = len(chunk.stress)
-                corners, difference = self.vertices[chunk.part].T, np.empty((3, e, m * k))
+                difference = np.empty((3, e, m * k))
+                corners = self.vertices[chunk.part].T
                 np.take(self.fits[:, 0], corners, axis=0, out=difference, mode="clip")  # clip needs no buffer
                 difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
                 difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)

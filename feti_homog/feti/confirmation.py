@@ -34,8 +34,9 @@ class InfluenceSolutions:
         # A prediction that F lambda will confirm: multipliers, jumps on inactive rows, and sums of the absolute
         # multipliers under single strains, all (owned rows, k).
         self._prediction: tuple[Float, Float, Float] | None = None
+        self._residual = self._rounding = 0.0
         # (2, v, v) Gram matrices of the unit jumps: projected on the active rows, and on all rows.
-        self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
+        self._squares = np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
         """Solve for loads `strains` (k, v) by influence columns, or return None if F lambda is due.  Collective.
@@ -82,7 +83,8 @@ class InfluenceSolutions:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.
         """
         if solutions and self._prediction is not None:
-            lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+            lam = np.stack([solution.lam for solution in solutions], axis=1)
+            opening = np.stack([solution.jump for solution in solutions], axis=1)
             # The error of a confirmed multiplier is at least its residual.
             lam_error, drift = self._errors(lam, opening, np.array([solution.residual for solution in solutions]))
             if not lam_error <= thresholds.MOST_UNCONFIRMED_ERROR:
@@ -115,10 +117,10 @@ class InfluenceSolutions:
         """
         assert self._prediction is not None
         predicted, jumps, terms = self._prediction
-        is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
+        is_open = (jumps != 0.0) & (self._natural.unconstrained_modes.shape[1] == 0)
         sizes = np.maximum(np.abs(lam), thresholds.LEAST_FOLLOWED * terms)
         errors = np.maximum(np.abs(predicted - lam), residuals * np.abs(lam))
-        parts = np.abs([errors, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
+        parts = np.abs([errors, is_open * (jumps - opening), sizes, opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose
-        lam_error, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
+        lam_error, drift = (parts[:2] / np.where(parts[2:] > 0.0, parts[2:], 1.0)).max(axis=1)
         return float(lam_error), float(drift)

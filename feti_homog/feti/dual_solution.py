@@ -110,15 +110,16 @@ class ActiveJumps:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))
             jump = jump + self.natural.G @ alpha
         # The position of a free body minimizes the jumps, so that cuts do not change the result.
-        if (Z := self.natural.unconstrained_modes).shape[1]:
+        Z = self.natural.unconstrained_modes
+        if Z.shape[1]:
             M = self.natural.G @ Z
             squares = allreduce_sparse(self.comm, (M.T @ M).tocsr())
             sums = distributed_arrays.allreduce_sum(self.comm, M.T @ jump)
             least = Z @ splu(squares.tocsc()).solve(sums)
             alpha, jump = alpha - least, jump - self.natural.G @ least
         residual = self.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
-        C, parts = self.operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
-        rows = zip(*parts, strict=True)
+        C = self.operator.compliance
+        rows = zip(strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual, strict=True)
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
@@ -147,10 +148,10 @@ class ActiveJumps:
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
         torn = (d @ solution.strain)[:, None]
-        jump = torn - self.operator.apply(solution.lam[:, None])
+        lam, iterations, reason = solution.lam[:, None], solution.iterations, solution.reason
+        jump = torn - self.operator.apply(lam)
         scale = self.norms(self.projected(torn))
-        parts = solution.iterations, solution.reason, scale
-        return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]
+        return self.solutions(solution.strain[None], lam, jump, iterations, reason, scale)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:

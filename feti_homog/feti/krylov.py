@@ -7,6 +7,7 @@ iteration advances all load cases.  `CallbackErrors` stores exceptions of the co
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from petsc4py import PETSc
@@ -153,7 +154,7 @@ class Krylov:
         self.ksp.setType(PETSc.KSP.Type.CG)
         self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
         self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=MAX_ITERATIONS)
-        self.ksp.setConvergenceTest(lambda *iteration: errors.call(lambda: test(*iteration), REASON.DIVERGED_NANORINF))
+        self.ksp.setConvergenceTest(lambda *state: errors.call(partial(test, *state), REASON.DIVERGED_NANORINF))
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setOptionsPrefix("feti_projected_")
@@ -203,7 +204,7 @@ class Krylov:
 
     def describe(self, iterations: int) -> str:
         """Return the line that -feti_view prints about the last solve."""
-        line = f"FETI: {self._columns} load case{'s' if self._columns > 1 else ''}, {iterations} iterations"
+        line = f"FETI: {self._columns} load case{'' if self._columns == 1 else 's'}, {iterations} iterations"
         if not iterations or self.extreme_values is None:
             return line
         smallest, largest = self.extreme_values

@@ -128,7 +128,8 @@ class FetiSolver:
     @cached_property
     def _torn_displacement(self) -> Float:
         """Compute the displacements -K+ Q (boundary dofs, v) of the torn cell under the unit loads."""
-        operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.condensed.boundary)
+        operators = self.interface_operators
+        u = operators.apply_flexibility(-self.condensed.boundary)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
         return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
@@ -159,15 +160,16 @@ class FetiSolver:
         `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
         the intact compliance.  No subdomain is factored anew.  Raises like `preconditioner.soften` and `.activate`.
         """
-        changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
-        change = self.comm.allreduce(changed, MPI.BOR)
-        if change >= 2:
+        changes = np.array([(active != self.active.mask).any(), (compliance != self.operator.compliance).any()])
+        self.comm.Allreduce(MPI.IN_PLACE, changes, MPI.LOR)
+        rows_change, springs_change = changes
+        if springs_change:
             self.preconditioner.soften(compliance - self.intact_compliance)
             self.operator.compliance = compliance
-        if change % 2:
+        if rows_change:
             self.active.mask = active
             self.natural.activate(active)
-        if change:
+        if rows_change or springs_change:
             self.preconditioner.activate(active)
             self._units = []
 
@@ -215,7 +217,7 @@ class FetiSolver:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
             starts: (owned rows, k) initial multipliers.
         """
-        k, columns = len(strains), None if self.is_pulled else self._by_columns
+        k, columns = len(strains), (None if self.is_pulled else self._by_columns)
         if strains.shape[1] == len(self.problem.loads):
             strains = strains @ self.closure.T
             if self._units:
@@ -228,16 +230,17 @@ class FetiSolver:
         if self.is_pulled:
             balance = self.natural.balancing(-self._pushes @ strains.T)
             torn_jump -= self.operator.apply(balance)
-        torn = self.jumps.norms(torn_jump)
         right = self.jumps.projected(torn_jump)
         jump = self.jumps.norms(right)
         # A load without a jump on the active rows has no multipliers.
-        rounding = self.jumps.rounding(self._torn_displacement, strains.T, jump, torn)
+        rounding = self.jumps.rounding(self._torn_displacement, strains.T, jump, self.jumps.norms(torn_jump))
         has_jump = jump > rounding
         scale = np.where(has_jump, jump, 1.0)
         right = np.where(has_jump, right, 0.0) / scale
-        E, forces = np.where(has_jump, strains.T, 0.0) / scale, self.preconditioner.closing_forces
-        closing = forces(right) if columns is None else columns.closing(self.d, E, has_jump / scale)
+        if columns is None:
+            closing = self.preconditioner.closing_forces(right)
+        else:
+            closing = columns.closing(self.d, np.where(has_jump, strains.T, 0.0) / scale, has_jump / scale)
         closing = self.natural.project(closing)
         krylov.test.jump_scale = float(np.sqrt(has_jump.sum()))
         krylov.test.force_scale = float(np.linalg.norm(self.jumps.norms(closing)))
@@ -246,12 +249,13 @@ class FetiSolver:
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if has_jump.any():
             lam, applied, iterations, reason = krylov.solve(lam, right)
-            smallest, largest = (iterations and krylov.extreme_values) or (1.0, self.condition)
-            self.condition = max(self.condition, largest / smallest)
+            extremes = krylov.extreme_values if iterations else None
+            if extremes is not None:
+                self.condition = max(self.condition, extremes[1] / extremes[0])
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
-        parts = lam * scale + balance, torn_jump - applied * scale, iterations, reason, np.maximum(jump, rounding)
-        solutions = self.jumps.solutions(strains, *parts)
+        lam, jumps = lam * scale + balance, torn_jump - applied * scale
+        solutions = self.jumps.solutions(strains, lam, jumps, iterations, reason, np.maximum(jump, rounding))
         if columns is not None:
             columns.record(solutions if has_jump.all() else [], self.d)
         return solutions
@@ -269,8 +273,8 @@ class FetiSolver:
 
     def displacement(self, solution: DualSolution) -> Float:
         """Complete a solution, and compute u* (local dofs,), Eq. (34); may factor interiors.  Collective."""
-        u, positions = self.boundary_displacement(solution), range(len(self.subdomains))
-        return np.concatenate([np.zeros(0), *(self.extended(i, u, solution.strain) for i in positions)])
+        u = self.boundary_displacement(solution)
+        return np.concatenate([u[:0], *(self.extended(i, u, solution.strain) for i in range(len(self.subdomains)))])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
         """Extend u (boundary dofs, k) to all dofs of the subdomain `place`, by `InterfaceOperators.extend`."""
@@ -290,7 +294,7 @@ class FetiSolver:
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for `columns` load cases; the first call sets it up and is collective."""
         if columns not in self._krylov:
-            parts = self.jump_operator.vector, self.preconditioner, self.jumps, columns
-            self._krylov[columns] = Krylov(*parts, restarts=self.adaptive is not None)
+            vector, restarts = self.jump_operator.vector, self.adaptive is not None
+            self._krylov[columns] = Krylov(vector, self.preconditioner, self.jumps, columns, restarts)
             self._shells.callback(self._krylov[columns].destroy)
         return self._krylov[columns]

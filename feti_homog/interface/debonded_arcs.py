@@ -43,8 +43,8 @@ class InterfaceChains:
         has_two = self.neighbours[:, 0] >= 0
         debonded = (status != BONDED)[self.neighbours] & has_two[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
-        pair, side = self.neighbours[node], np.argmax(debonded[node], axis=1)
-        return CrackTips(node, np.take_along_axis(pair, side[:, None], 1)[:, 0], pair[np.arange(len(node)), 1 - side])
+        side = np.argmax(debonded[node], axis=1)
+        return CrackTips(node, behind=self.neighbours[node, side], ahead=self.neighbours[node, 1 - side])
 
     def onward(self, start: Int, through: Int, steps: int) -> Int:
         """Follow the interfaces from the nodes `start` (t,) through the nodes `through` (t,).
@@ -104,7 +104,8 @@ def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres:
     """
     marks: dict[int, set[float]] = {}
     for arc in arcs:
-        halves = [opening / 2 for opening in (values if arc.angle is None else (arc.angle,)) if 0 < opening < 360]
+        openings = values if arc.angle is None else (arc.angle,)
+        halves = [opening / 2 for opening in openings if 0 < opening < 360]
         ends = {_end(arc, side * half) for half in halves for side in (-1, 1)}
         for fibre in range(1, fibres + 1) if isinstance(arc.fibre, str) else arc.fibre:
             marks.setdefault(fibre - 1, set()).update(ends)
@@ -151,15 +152,16 @@ def debonded(
         assert width is not None
         ends = np.empty((2, len(fibre)))  # of the arc at each node, not reduced to [0, 360)
         for end, half in zip(ends, (-width / 2, width / 2), strict=True):
-            end[:], tip = arc.centre + half, _end(arc, half)
+            end[:] = arc.centre + half
             for (number, direction), actual in moved.items():
-                if direction == tip:
+                if direction == _end(arc, half):
                     end[fibre == number] += actual - direction
         start, stop = ends
         offset = (angle - start) % 360.0
         within = (offset > TIP_TOLERANCE_DEGREES) & (offset < stop - start - TIP_TOLERANCE_DEGREES)
         within = (within & (0 < width < 360)) | (width >= 360.0)
-        inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
+        is_chosen = np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else np.ones(len(fibre), bool)
+        inside |= within & is_chosen
     return inside
 
 

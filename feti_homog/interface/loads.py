@@ -119,7 +119,8 @@ class LoadScales:
         self.solver, self.size = solver, size
         m, stresses, nodes = solver.problem.strains, solver.problem.stresses, solver.jump_operator.nodes
         parts = self.solver.comm.allgather([(s.areas, s.laws) for s in self.solver.subdomains])
-        areas, stiffnesses = map(np.concatenate, zip(*(pair for pairs in parts for pair in pairs), strict=True))
+        pairs = [pair for pairs_of_rank in parts for pair in pairs_of_rank]
+        areas, stiffnesses = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
         shares = areas / areas.sum()
         self.mean_stiffness = phase_bounds.voigt(shares, stiffnesses)
         self.least_bonded_stiffness = self.mean_stiffness.copy()
@@ -235,27 +236,27 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     unknown = np.flatnonzero(load.by_stress)
     strains = np.vstack([np.where(load.by_stress, 0.0, load.values), np.eye(len(load.values))[unknown]])
     starts = np.column_stack([start, np.zeros((len(start), len(unknown)))])
-    needed = slice(0 if strains[0].any() else 1, None)
+    has_strain = bool(strains[0].any())
+    needed = slice(0 if has_strain else 1, None)
     solutions = solver.solve_many(strains[needed], starts[:, needed])
     stresses = np.stack([solver.stress_integral(solution)[unknown] / scales.size.prod() for solution in solutions])
-    deficit = load.values[unknown]
-    if strains[0].any():
-        deficit = deficit - stresses[0]
+    deficit = load.values[unknown] - stresses[0] if has_strain else load.values[unknown]
     imposed = scales.imposed_strain(strains[0])
     noise = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
     # Roots of stiffnesses scale the strains, so that all strains have similar sizes.  Scaled stiffnesses below the
     # solver's error, and scaled stresses below `noise`, are zero.
     stiffness, roots = stresses[-len(unknown) :], scales.roots[unknown]
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
-    along, resists = vectors.T @ (deficit / roots), eigenvalues > scales.sign_noise
+    along = vectors.T @ (deficit / roots)
+    resists = eigenvalues > scales.sign_noise
     largest = max(NEGLIGIBLE * np.abs(deficit / roots).max(), noise)
     is_carried = not np.abs(along[~resists]).max(initial=0.0) > largest
     answer = vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots if is_carried else None
     # Rank 0 decides: where a stiffness nearly vanishes, rounding may differ from processor to processor.
-    factors = solver.comm.bcast(answer)
-    if factors is None:
+    unknown_strains = solver.comm.bcast(answer)
+    if unknown_strains is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
-    factors = np.concatenate([np.ones(len(solutions) - len(unknown)), factors])
+    factors = np.concatenate([np.ones(len(solutions) - len(unknown)), unknown_strains])
     return solver.jumps.superposed(solutions, factors, solver.d)
 
 
@@ -271,8 +272,8 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     sizes, open_jumps = (distributed_arrays.allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
     largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
-    pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
-    values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
-    # The eigenvalues are squares of sizes.
+    stiffness = solver.torn_stiffness[np.ix_(unknown, unknown)]
+    resistance = open_jumps / np.outer(scales[0], scales[0]) + stiffness / np.outer(scales[1], scales[1])
+    values, vectors = np.linalg.eigh(resistance)  # the eigenvalues are squares of sizes
     undetermined[unknown] = (np.abs(vectors[:, values < NEGLIGIBLE**2]) > NEGLIGIBLE).any(axis=1)
     return np.asarray(solver.comm.bcast(undetermined))

@@ -88,7 +88,8 @@ class Arrangement:
     def phases(self) -> tuple[str, ...]:
         """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating if any."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
-        return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
+        has_coating = (self.coated & ~self.is_hollow).any()
+        return (MATRIX, *named, COATING) if has_coating else (MATRIX, *named)
 
     @property
     def is_void(self) -> Bool:
@@ -234,7 +235,8 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
         # A place has about 2 pi times as many neighbours as its square with diagonal `reach` contains.
         column, row = np.floor(place * (np.sqrt(2) / reach)).astype(np.int64).T
         _, crowd = np.unique(column * 2**32 + row, return_counts=True)
-        if (count := np.pi * float((crowd.astype(float) ** 2).sum())) > MOST_PAIRS:
+        count = np.pi * float((crowd.astype(float) ** 2).sum())
+        if count > MOST_PAIRS:
             raise MeshError(
                 f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
                 f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"

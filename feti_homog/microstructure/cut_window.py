@@ -34,8 +34,8 @@ def moves(outlines: Outlines, size: Float) -> Float:
     across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * unit
     normal, least = parting(first, second, vector)
     within = (((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second]))[~across]
-    gap, moved = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP)), np.zeros_like(centres)
-    pairs = np.zeros((0, 5))
+    gap = float(np.clip(within.min(initial=MOST_GAP), LEAST_GAP, MOST_GAP))
+    moved, pairs = np.zeros_like(centres), np.zeros((0, 5))
     for _ in range(MAX_STEPS):
         # Pairs of different fibres that are closer than allowed, or may become so.
         places = centres + moved
@@ -53,7 +53,9 @@ def moves(outlines: Outlines, size: Float) -> Float:
         # A row for each pair that was too close in any step: both fibres, periods between them, least gap.
         pairs = np.concatenate([pairs, np.column_stack([first, second, shift, needed])[short]])
         pairs = pairs[np.unique(pairs[:, :4], axis=0, return_index=True)[1]]
-        last, moved = moved, _least_moves(outlines, pairs, moved, size) if len(pairs) else moved
+        last = moved
+        if len(pairs):
+            moved = _least_moves(outlines, pairs, moved, size)
         if not short.any() and np.abs(moved - last).max() < SETTLED * unit:
             return moved
     raise MeshError("there is no room to move them apart")

@@ -73,8 +73,9 @@ class FibrePattern:
         number = np.arange(self.count)
         if not self.periodic:
             return self.centres, number
-        steps = [range(-n, n + 1) for n in (ceil(reach / length) for length in self.size)]
-        shifts = np.array([step for step in product(*steps) if any(step)], dtype=float).reshape(-1, 2) * self.size
+        periods = [ceil(reach / length) for length in self.size]
+        steps = product(*(range(-n, n + 1) for n in periods))
+        shifts = np.array([step for step in steps if any(step)], dtype=float).reshape(-1, 2) * self.size
         result = self.wrapped + shifts[:, None]
         shift, owner = np.nonzero(np.all((result > -reach) & (result < self.size + reach), axis=2))
         return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([number, owner])

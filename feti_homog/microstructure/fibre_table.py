@@ -20,7 +20,8 @@ from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
 from feti_homog.schema import types, wording
 from feti_homog.typing import Bool, Float, Int
 
-COLUMNS = (*list(table_columns.NUMBERS)[:3], "phase", *list(table_columns.NUMBERS)[3:])
+FIRST_COLUMNS = ("x", "y", "radius", "phase")
+COLUMNS = (*FIRST_COLUMNS, *(name for name in table_columns.NUMBERS if name not in FIRST_COLUMNS))
 SIZES = ("width", "height", "left", "bottom")
 """Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
@@ -155,7 +156,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     rows: dict[int, dict[str, Any]] = {}
     # The first line has names, or no numbers, and units may follow.
     if columns is None or all(table_columns.number_of(word, delimiter) is None for word in head[0]):
-        lines = lines[2 if any(map(table_columns.are_units, head[1:])) else 1 :]
+        lines = lines[2:] if any(map(table_columns.are_units, head[1:])) else lines[1:]
     for number, line in lines:
         cells = table_columns.cells_of(line, delimiter)
         if fault := table_columns.row_fault(line, cells, len(words)):
@@ -208,11 +209,12 @@ def _check_names(
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
     endings = (table_columns.UNIT.search(words[column.place].strip()) for column in read if column.name != "angle")
-    if len(units := {ending[2].lower() for ending in endings if ending and ending[2]}) > 1:
+    units = {ending[2].lower() for ending in endings if ending and ending[2]}
+    if len(units) > 1:
         faults.add(row, f"columns in {' and '.join(sorted(units))}: expected one unit of length")
     ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
     # The radius, or the sizes of a shape that replace it.
-    sizes = next((sizes for sizes in (("radius",), *REPLACING) if {*names} & {*sizes}), ("radius",))
+    sizes = next((sizes for sizes in (("radius",), *REPLACING) if not set(names).isdisjoint(sizes)), ("radius",))
     for name in ("x", "y", *sizes):
         if name not in names:
             faults.add(row, f"column {name}: missing{ignored}")
@@ -224,15 +226,16 @@ def _table(
     """Check all `rows`, and build the table with size and corner from `sizes`.  Raises CaseError with all `faults`."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
-        for key in ("x", "y", *([] if has_size else ["radius"])):
+        for key in ("x", "y") if has_size else ("x", "y", "radius"):
             if key not in cells:
                 faults.add(row, f"{key}: no value; expected a number")
         for key in table_columns.NUMBERS:
             if complaint := table_columns.FIBRE_CELLS[key].complaint(cells.get(key, 1.0)):
                 faults.add(row, f"{key} = {wording.toml_value(cells[key])}: {complaint}")
         phase = cells.get("phase", "fibre")
-        for key in (key for key in OF_FIBRES if phase == VOID and cells.get(key)):
-            faults.add(row, f"{key} = {wording.toml_value(cells[key])}: a void has none")
+        for key in OF_FIBRES:
+            if phase == VOID and cells.get(key):
+                faults.add(row, f"{key} = {wording.toml_value(cells[key])}: a void has none")
         if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
             words = f"phase = {wording.toml_value(phase)}: expected a name of letters, digits, _, - and :"
             faults.add(row, f'{words}, but not "matrix", which is around the fibres')

@@ -53,7 +53,8 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
         peaks.append(np.column_stack([centre, np.full(len(row), radius), votes[row, column]]))
         radius *= 1.1
     circles, counts = np.split(np.concatenate(peaks), [3], axis=1)
-    excess, part = _excess(circles, counts[:, 0], size, 0.15), 0.0
+    part = 0.0
+    excess = _excess(circles, counts[:, 0], size, 0.15)
     circles, excess = circles[excess > 0.3], excess[excess > 0.3]
     for reach, least in FITS:
         circles = circles[_apart(circles, excess)]
@@ -95,9 +96,10 @@ def _apart(circles: Float, excess: Float) -> Bool:
     for k in np.argsort(-excess, kind="stable"):
         if not is_covered[k]:
             rivals = np.array(tree.query_ball_point(circles[k, :2], 2 * circles[k, 2]))
-            x, y, radius = (circles[rivals] - circles[k] * [1, 1, -1]).T
+            x, y = (circles[rivals, :2] - circles[k, :2]).T
+            both = circles[rivals, 2] + circles[k, 2]
             smaller = np.minimum(circles[rivals, 2], circles[k, 2])
-            rivals = rivals[np.hypot(x, y) < radius - 0.4 * smaller]
+            rivals = rivals[np.hypot(x, y) < both - 0.4 * smaller]
             is_apart[k] = not is_apart[rivals].any()
             is_covered[rivals] |= is_apart[k]
     return is_apart

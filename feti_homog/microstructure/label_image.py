@@ -31,22 +31,22 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)
-    names = [*map(str, numbers.tolist())]
+    names = list(map(str, numbers.tolist()))
     shares = [f"{name}: {share:.3g} %" for name, share in zip(names, 100 * counts / image.size, strict=True)]
     listed = f"{path.name} has {', '.join(shares[:MOST_FAULTS])}{', ...' if len(names) > MOST_FAULTS else ''}"
     faults = []
     if unnamed := [name for name in names if name not in labels]:
-        few = ", ".join(unnamed if len(unnamed) <= 3 else [*unnamed[:3], "..."])
+        few = ", ".join(unnamed[:3]) + (", ..." if len(unnamed) > 3 else "")
         way = ""
         if len(unnamed) > 16:
             way = "; turn grey values into labels by a threshold, or into a table by fibres --image"
         faults.append(f"[cell] labels: no phase for {few}; {listed}{way}")
-    for name in sorted(labels.keys() - {*names}):
+    for name in sorted(labels.keys() - set(names)):
         faults.append(f"[cell] labels {name} = {wording.toml_value(labels[name])}: no pixel has it; {listed}")
     if faults:
         raise CaseError(*faults)
-    ends = phase_names.MATRIX, phase_names.VOID
-    phases = tuple(sorted({*labels.values()}, key=lambda name: (name != ends[0], name == ends[1], name)))
+    rank = {phase_names.MATRIX: 0, phase_names.VOID: 2}
+    phases = tuple(sorted(set(labels.values()), key=lambda name: (rank.get(name, 1), name)))
     phase = np.array([phases.index(labels[name]) for name in names], np.int32)[np.searchsorted(numbers, image)]
     phase = phase[::-1]  # the first row of an image is the upper one
     if is_mirrored:
@@ -67,7 +67,8 @@ def read_image(path: Path, is_grey: bool = False) -> Array:
     if not is_grey and image.dtype.kind == "f" and np.all((image == np.rint(image)) & (np.abs(image) < 1 << 31)):
         image = image.astype(np.int64)
     if image.ndim != 2 or image.dtype.kind not in ("iubf" if is_grey else "iub"):
-        shape, way = "x".join(map(str, image.shape)), "; cut one layer out of a stack" * (image.ndim > 2)
+        shape = "x".join(map(str, image.shape))
+        way = "; cut one layer out of a stack" if image.ndim > 2 else ""
         expected = f"expected one whole number a pixel, in rows{way}"
         raise CaseError(f"{path.name}: {shape} values of type {image.dtype}; {expected}")
     _check_size(path, *image.shape)

@@ -8,7 +8,7 @@ from feti_homog.errors import MOST_FAULTS, MeshError
 from feti_homog.microstructure import Arrangement, arrangements, cut_window
 from feti_homog.microstructure.fibre_table import SAME_FIBRE, FibreTable
 from feti_homog.microstructure.shapes import Discs, Outlines, directions
-from feti_homog.microstructure.shapes.shapes import SHAPES, with_parts
+from feti_homog.microstructure.shapes.shapes import REPLACING, with_parts
 from feti_homog.typing import Bool, Float, Int
 
 # Directions in which outlines are compared.
@@ -43,7 +43,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         moved = np.flatnonzero(distance > cut_window.TOLERANCE * table.radius.mean())
         farthest = moved[np.argsort(-distance[moved], kind="stable")][:MOST_FAULTS]
         listed = [f"row {table.row[retained[k]]} by {distance[k]:.3g}" for k in farthest]
-        listed += [f"and {len(moved) - MOST_FAULTS} others by less"] if len(moved) > MOST_FAULTS else []
+        if len(moved) > MOST_FAULTS:
+            listed.append(f"and {len(moved) - MOST_FAULTS} others by less")
         which = f": {', '.join(listed)}" if listed else ""
         remarks += (f'[cell] window = "cut": {len(moved)} of {len(table.row)} fibres moved{which}',)
     order = np.argsort(table.is_void[retained], kind="stable")
@@ -88,7 +89,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     for fibre in (first[near], second[near]):
         sizes = np.stack([table.columns[name][retained[fibre]] for name in ("radius", "a", "b")])
         np.maximum.at(share, retained[fibre], (least - gap)[near] / np.nanmin(sizes, axis=0))
-    names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
+    names = {"radius"}.union(*REPLACING)
     # Slightly more than half, because a later check compares the gap with the reduced radii.
     columns = {name: values * (1 - 0.51 * share) if name in names else values for name, values in table.columns.items()}
     rows = table.row[share > 0]
@@ -119,16 +120,18 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """
     size, centres, is_cut = table.size, table.places, window == "cut"
     # The largest length of every row, and the column of this length.
-    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
+    names = ["radius", *(name for sizes in REPLACING for name in sizes)]
     sizes = np.nan_to_num(np.stack([table.columns[name] for name in names]))
-    radius, column, faults = sizes.max(axis=0), sizes.argmax(axis=0), list[str]()
+    radius, column = sizes.max(axis=0), sizes.argmax(axis=0)
+    faults: list[str] = []
     # Discs must reach into a periodic cell; in a cut window the centres must lie inside.
-    for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
-        over = np.maximum(-centres[:, axis], centres[:, axis] - width)
-        reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
+    axes = (("x", "width", table.left), ("y", "height", table.bottom))
+    for (axis, name, corner), place, width in zip(axes, centres.T, size.tolist(), strict=True):
+        over = np.maximum(-place, place - width)
+        reach = np.full_like(radius, 2 * radius.max()) if corner is None else radius
         for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
-            value = table.columns["xy"[axis]][k]
-            faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
+            value = f"{axis} = {table.columns[axis][k]:g}"
+            faults.append(f"row {table.row[k]}: {value}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < arrangements.SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {arrangements.SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: {names[column[k]]} = {radius[k]:g}: expected {limits}")
@@ -137,9 +140,9 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
         value = table.coating[k]
         faults.append(f"row {table.row[k]}: coating = {value:g}: expected 0, or from {least:g} to {most:g}")
     _raise_faults(table, faults)
-    first, faults = _without_images(table, centres, size, is_cut)
+    is_first, faults = _without_images(table, centres, size, is_cut)
     _raise_faults(table, faults)
-    retained = np.flatnonzero(first)
+    retained = np.flatnonzero(is_first)
     centres = centres[retained]
     outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
     # Fibres that overlap or touch; a cut window may have such pairs across the border.
@@ -166,8 +169,8 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
     """Return the table indices (fibres,) of the fibres in the cell, without voids and images."""
-    first, _ = _without_images(table, table.places, table.size, window == "cut")
-    return np.flatnonzero(first & ~table.is_void)
+    is_first, _ = _without_images(table, table.places, table.size, window == "cut")
+    return np.flatnonzero(is_first & ~table.is_void)
 
 
 def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:

@@ -145,7 +145,9 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
         if {name, INSTEAD.get(name, name)}.isdisjoint(given):
-            columns += [SourceColumn(bare.index(other), name, value) for other in others if other in bare][:1]
+            other = next((other for other in others if other in bare), None)
+            if other is not None:
+                columns.append(SourceColumn(bare.index(other), name, value))
     read = {column.place for column in columns}
     return columns, [word for place, word in enumerate(words) if place not in read]
 

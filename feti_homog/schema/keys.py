@@ -87,7 +87,7 @@ class Key:
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
         words = self.type.complaint(table[name])
-        return words and f" = {toml_value(table[name])}: {words}"
+        return f" = {toml_value(table[name])}: {words}" if words else ""
 
 
 def key(
@@ -109,7 +109,9 @@ def key(
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
     required = default is dataclasses.MISSING
-    words = absent or default_words or ("" if required or default is None else toml_value(default))
+    words = absent or default_words
+    if not words and not required and default is not None:
+        words = toml_value(default)
     entry = Key(type_, meaning, default=words, only=conditions, required=required, **attributes)
     return dataclasses.field(default=None if required and conditions else default, metadata={"key": entry})
 
@@ -142,10 +144,15 @@ class TableReader:
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
             return None
         keys, before = keys_of(table_class), len(self.faults)
-        faults = dict.fromkeys((name for name in table if name not in keys), "")
-        for name in [*faults][: max(MOST_FAULTS + 1 - before, 0)]:  # others are only counted
+        unknown = [name for name in table if name not in keys]
+        faults = dict.fromkeys(unknown, "")
+        worded = max(MOST_FAULTS + 1 - before, 0)  # further faults are only counted
+        for name in unknown[:worded]:
             faults[name] = f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
-        faults |= {name: words for name, entry in keys.items() if (words := entry.fault(name, table))}
+        for name, entry in keys.items():
+            fault = entry.fault(name, table)
+            if fault:
+                faults[name] = fault
         self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faults.items()]
         good = {name: value for name, value in table.items() if name not in faults}
         values = {k: self._stored(keys[k].type, value, section, f"{prefix}{k}") for k, value in good.items()}
@@ -175,8 +182,9 @@ def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
             return INF
         return to_table(value, selected) if dataclasses.is_dataclass(value) else value
 
-    return {
-        name: to_toml(value)
-        for name, entry in keys_of(type(instance)).items()
-        if (value := getattr(instance, name)) is not None and all(rule.holds(selected) for rule in entry.only)
-    }
+    table = {}
+    for name, entry in keys_of(type(instance)).items():
+        value = getattr(instance, name)
+        if value is not None and all(condition.holds(selected) for condition in entry.only):
+            table[name] = to_toml(value)
+    return table

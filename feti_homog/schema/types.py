@@ -52,9 +52,11 @@ class ValueType:
         """Return "expected ..." for an invalid value, empty for a valid value."""
         if self.accepts(value):
             return ""
-        advice = suggestion(value, self.options, {}) if self.options and isinstance(value, str) else "expected"
-        proposal = "" if advice.startswith("expected") else f"; {advice}"
-        return f"expected {self.expected}{hint(value)}{proposal}"
+        complaint = f"expected {self.expected}{hint(value)}"
+        if not self.options or not isinstance(value, str):
+            return complaint
+        advice = suggestion(value, self.options, {})
+        return complaint if advice.startswith("expected") else f"{complaint}; {advice}"
 
 
 def hint(value: Any) -> str:
@@ -64,7 +66,7 @@ def hint(value: Any) -> str:
     if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):
         return "; `feti-homog uncertainty` takes scatter"
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
-    return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""
+    return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""  # NaN differs from itself
 
 
 def is_number(value: Any) -> bool:
@@ -107,8 +109,9 @@ def list_of(
     expected += f", at most {most} of them" if most else ""
 
     def accepts(value: Any) -> bool:
-        has_length = isinstance(value, list) and fewest <= len(value) <= largest
-        return has_length and all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
+        if not isinstance(value, list) or not fewest <= len(value) <= largest or not all(map(item.accepts, value)):
+            return False
+        return not unique or len(set(value)) == len(value)
 
     return ValueType(expected, accepts, lambda value: tuple(map(item.store, value)), item=item if item.table else None)
 

@@ -74,12 +74,14 @@ def suggestion(name: str, known: Collection[str], owners: Mapping[str, str]) -> 
     `known` are the valid names, and `owners` maps every key of the file to its sections, in words.
     """
     word = re.sub("[ -]", "_", name.lower())
-    if keys := [key for key in SYNONYMS.get(word, ()) if key in known]:
+    synonyms = SYNONYMS.get(word, ())
+    if keys := [key for key in synonyms if key in known]:
         return f"did you mean {' or '.join(keys)}?"
     if word in ABSENT:
         return ABSENT[word]
-    if key := next((key for key in (name, *SYNONYMS.get(word, ())) if key in owners), ""):
-        return f"{'it' if key == name else key} belongs to {owners[key]}"
+    for key in (name, *synonyms):
+        if key in owners:
+            return f"{'it' if key == name else key} belongs to {owners[key]}"
     if nearest := difflib.get_close_matches(name, known, n=1):
         return f"did you mean {toml_key(nearest[0])}?"
     return "expected one of " + ", ".join(map(toml_key, known))

@@ -129,23 +129,24 @@ def face_neighbourhoods(
     triangles = np.flatnonzero(is_near)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
     label = periodic_topology.components(len(triangles), *periodic_topology.edge_pairs(edges))
-    neighbourhoods, lattice, all_of = [], body.mesh.lattice, body.problem.dofs
+    neighbourhoods, lattice, problem = [], body.mesh.lattice, body.problem
     for k in range(label.max() + 1):
         members = triangles[label == k]
         outside = np.zeros_like(on_face)
         outside[np.delete(classes, members, axis=0)] = True
         piece = submeshes.part(body.submesh, members)
-        subdomain = Subdomain.build(piece, lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
+        subdomain = Subdomain.build(piece, lattice, body.L, problem, is_thin=body.is_thin, mixed=body.mixed)
         of_body = np.empty(subdomain.mesh.n_classes, np.int64)
         of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = classes[members]
-        nodes = np.flatnonzero(on_face[of_body])
-        if len(nodes) < 2:  # a single node can only translate, and has no soft mode
+        face_nodes = np.flatnonzero(on_face[of_body])
+        if len(face_nodes) < 2:  # a single node can only translate, and has no soft mode
             continue
-        face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
-        movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
+        face_dofs = problem.dofs(face_nodes)
+        movable = problem.dofs(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
         K = subdomain.take_stiffness()
-        S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
-        P = trace_space(piece, lattice, body.problem, nodes, thresholds.min_trace_dofs)
-        operator = ExplicitInterfaceOperator(subdomain, K, face)
-        neighbourhoods.append(FaceNeighbourhood(at, operator, subdomain.R[face], P, S_fixed))
+        S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face_dofs))
+        P = trace_space(piece, lattice, problem, face_nodes, thresholds.min_trace_dofs)
+        operator = ExplicitInterfaceOperator(subdomain, K, face_dofs)
+        at = np.searchsorted(dofs, problem.dofs(of_body[face_nodes]))
+        neighbourhoods.append(FaceNeighbourhood(at, operator, subdomain.R[face_dofs], P, S_fixed))
     return neighbourhoods

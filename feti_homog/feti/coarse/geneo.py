@@ -63,7 +63,7 @@ class AveragedModes:
         self.total = int(ends[-1]) if len(ends) else 0
         self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
         none = np.zeros(0, np.int64)
-        self.columns = [np.unique(np.concatenate([none, *(columns for _, columns, _ in of)])) for of in self._jumps]
+        self.columns = [np.unique(np.concatenate([none, *(modes for _, modes, _ in part)])) for part in self._jumps]
         self.reaching = np.unique(np.concatenate([none, *self.columns]))
         numbers = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
         self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
@@ -102,8 +102,8 @@ def subdomain_blocks(
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
         constraints, scaled = (local_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
-        parts = operators.dofs[i], operator, constraints, scaled, operators.facewise[i]
-        blocks.append(SubdomainBlocks(subdomain, *parts))
+        dofs, facewise = operators.dofs[i], operators.facewise[i]
+        blocks.append(SubdomainBlocks(subdomain, dofs, operator, constraints, scaled, facewise))
     return blocks
 
 
@@ -131,8 +131,7 @@ def kernels_and_soft_modes(
     """
     parts = list(zip(blocks, neighbours.common, strict=True))
     problems = mpi_errors.agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
-    # Contributions of the neighbours to M^-1, on common rows.
-    received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
+    received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]  # the neighbours' parts of M^-1, on common rows
 
     def messages() -> Iterator[tuple[int, int, Float32]]:
         for i, problem in enumerate(problems):

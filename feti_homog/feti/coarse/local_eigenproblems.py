@@ -93,12 +93,11 @@ class FaceEigenproblems:
         self.block, self.common = block, common
         self._factor, self._decayed = thresholds.face_factor, thresholds.decayed
         problem = block.subdomain.problem
-        faces = {s: np.unique(problem.nodes(block.B[rows].indices)) for s, rows in common.items()}
-        self._neighbourhoods = {
-            s: face_neighbourhoods(block.subdomain, block.dofs, problem.dofs(nodes), thresholds)
-            for s, nodes in faces.items()
-            if s != block.subdomain.submesh.index
-        }
+        self._neighbourhoods = {}
+        for s, rows in common.items():
+            if s != block.subdomain.submesh.index:
+                dofs = problem.dofs(np.unique(problem.nodes(block.B[rows].indices)))
+                self._neighbourhoods[s] = face_neighbourhoods(block.subdomain, block.dofs, dofs, thresholds)
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
         """Yield every neighbour, and an upper bound (r, r) for this subdomain's part of M^-1 on r shared rows."""

@@ -83,7 +83,8 @@ class NaturalCoarseSpace:
         if not self.kernel_dimension:
             return
         # Rows of Z: unconstrained modes whose first subdomain is on this rank.
-        modes, first = self.unconstrained_modes, self.unconstrained_modes.indices[self.unconstrained_modes.indptr[:-1]]
+        modes = self.unconstrained_modes
+        first = modes.indices[modes.indptr[:-1]]
         Z = modes[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
         self.unknowns = np.union1d(self._reaching, Z.indices).astype(np.int64)
         self._G = self.G_active[:, self.unknowns].tocsr()
@@ -146,18 +147,16 @@ class GramMatrix:
         """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
-        # Pairs of entries of one row.
-        row = np.repeat(np.arange(len(count)), count**2)
-        within = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+        # For every row, its number of products, and the number of the first; for every product, its entry and value.
+        self._count = count**2
+        self._first = np.cumsum(self._count) - self._count
+        row = np.repeat(np.arange(len(count)), self._count)
+        within = np.arange(len(row)) - self._first[row]
         a, b = G.indptr[row] + within // count[row], G.indptr[row] + within % count[row]
         key = G.indices[a].astype(np.int64) * self._m + G.indices[b]
         diagonal = np.arange(self._m) * (self._m + 1)
         self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
-        entry = np.searchsorted(self._keys, key)
-        # For every row, the number of its first product, and its number of products; for every product, its value and
-        # the entry to which it adds.
-        self._first, self._count = np.cumsum(count**2) - count**2, count**2
-        self._entry, self._product = entry, G.data[a] * G.data[b]
+        self._entry, self._product = np.searchsorted(self._keys, key), G.data[a] * G.data[b]
         self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
         self._rows, self._columns = np.divmod(self._keys, self._m)
         # Modes that G^T G couples have a common eigenproblem, about as large as the kernel of a fibre.  A tuple has
@@ -176,7 +175,7 @@ class GramMatrix:
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]
-        at = np.arange(count.sum()) + np.repeat(self._first[changed] - np.cumsum(count) + count, count)
+        at = distributed_arrays.ranges(self._first[changed], count)
         products = self._product[at] * np.repeat((active - self._active)[changed], count)
         self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
         self._active = active.copy()
@@ -187,12 +186,12 @@ class GramMatrix:
 
         `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) are 0.
         """
-        padded, columns, none = np.append(self.entries(active), 0.0), 0, np.zeros(0, np.int64)
-        rows, numbers, values = [none], [none], [np.zeros(0)]
+        padded, columns = np.append(self.entries(active), 0.0), 0
+        rows, numbers, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for members, places, blocks, eigenvalues, vectors in self._groups:
             now = padded[places]
-            # A broken bond changes one or two groups.
-            if len(changed := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
+            changed = np.flatnonzero((now != blocks).any(axis=(1, 2)))
+            if len(changed):  # a broken bond changes one or two groups
                 eigenvalues[changed], vectors[changed] = np.linalg.eigh(now[changed])
                 blocks[changed] = now[changed]
             which, mode = np.nonzero(eigenvalues <= tolerance[members].max(axis=1, keepdims=True))

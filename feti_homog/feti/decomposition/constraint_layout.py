@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, side_lengths
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh, refinement
+from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -76,8 +77,7 @@ class ConstraintLayout:
         copies = shared.copies
         self.count = components * shared.nodes * (copies - 1)
         self.first = np.cumsum(self.count) - self.count
-        shift: Int = np.repeat(components * shared.first - self.first, self.count)
-        self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
+        self.rows = distributed_arrays.ranges(components * shared.first, self.count)
         self.dofs = np.cumsum([0, *(components * s.mesh.n_classes for s in subdomains)])
         self.base = np.full(len(shared.sharer), -1)
         entity = np.repeat(np.arange(len(shared.key)), copies)
@@ -106,7 +106,8 @@ class ConstraintLayout:
             # (k - 1, k) orthonormal contrasts between the copies in each of two bodies, and between the body means.
             # One body, or more than two bodies, cannot part and count as one body.
             sizes = np.diff(np.flatnonzero(code[:-1]))
-            k, contrasts = int(sizes.sum()), helmert(int(sizes.sum()))
+            k = int(sizes.sum())
+            contrasts = helmert(k)
             if len(sizes) == 2:
                 contrasts = np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
             members = np.flatnonzero(group.ravel() == number)
@@ -158,9 +159,10 @@ class ConstraintLayout:
         # The length of a node is int N ds along the curve on both sides; half of both sides for linear elements.
         normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
         order = self.lattice.order
-        side, in_middle = order / self.lattice.intervals, shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
-        starts = (place - part * side for part in (1.0, 0.0, 0.5))
-        before, after, around = (side_lengths(normal, turn, start, order, side) for start in starts)
+        side = order / self.lattice.intervals
+        before, after = (side_lengths(normal, turn, start, order, side) for start in (place - side, place))
+        around = side_lengths(normal, turn, place - side / 2, order, side)
+        in_middle = shared.is_edge[entity] & (p % 2 == 0) & (order == 2)
         on_edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
         return InterfaceNodes(
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
@@ -185,9 +187,8 @@ class ConstraintLayout:
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
         # Sharers are sorted inwards: the first sharer belongs to the outer body.
         outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
-        of_outer, of_inner = (
-            np.bincount(entity[shared.body == body[entity]], minlength=len(outer)) for body in (outer, inner)
-        )
+        of_outer = np.bincount(entity[shared.body == outer[entity]], minlength=len(outer))
+        of_inner = np.bincount(entity[shared.body == inner[entity]], minlength=len(inner))
         two = np.flatnonzero((outer != inner) & (of_outer + of_inner == shared.copies))
         e, p = expand(two, shared.nodes[two])
         row = self.first[e] + self.components * ((p + 1) * (shared.copies[e] - 1) - 1)
@@ -211,6 +212,4 @@ class ConstraintLayout:
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
     """Return the entity and the position p on it for every fine node; `entities` (e,) have `nodes` (e,) fine nodes."""
-    ends = np.cumsum(nodes)
-    p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
-    return np.repeat(entities, nodes), p
+    return np.repeat(entities, nodes), distributed_arrays.ranges(np.zeros_like(nodes), nodes)

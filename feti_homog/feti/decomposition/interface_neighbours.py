@@ -132,11 +132,9 @@ class InterfaceNeighbours:
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
         """Return the interface node number (local fine nodes,) of every local fine node; -1 off interfaces."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
-        normal = np.searchsorted(jump_operator.rows, self.rows)
-        normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))
-        local = np.flatnonzero(jump_operator.rows[normal] == self.rows) if len(jump_operator.rows) else np.zeros(0, int)
-        B = jump_operator.B[normal[local]].tocoo()
-        number[B.col // jump_operator.components] = local[B.row]
+        _, node, normal = np.intersect1d(self.rows, jump_operator.rows, assume_unique=True, return_indices=True)
+        B = jump_operator.B[normal].tocoo()
+        number[B.col // jump_operator.components] = node[B.row]
         return number
 
 

@@ -75,7 +75,8 @@ def interface_geometry(
     # The last sharer of an edge between two bodies is a piece of the fibre.
     edges = np.flatnonzero(sharers.is_edge & can_part)
     mesh = meshes.whole
-    edge, subdomain_of = np.searchsorted(mesh.edge_keys, sharers.key[edges]), np.full(len(mesh.edge_keys), -1)
+    edge = np.searchsorted(mesh.edge_keys, sharers.key[edges])
+    subdomain_of = np.full(len(mesh.edge_keys), -1)
     subdomain_of[edge] = sharers.innermost[edges]
     sides = mesh.edge_class[mesh.triangle_edges]
     triangle, k = np.nonzero(subdomain_of[sides] == meshes.index[meshes.member][:, None])
@@ -84,12 +85,14 @@ def interface_geometry(
     triangle, k = triangle[place], k[place]
     plane = mesh.triangle_edges[triangle, k]
     normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
-    normals[edges], turns[edges] = normal, turn = edge_normals(mesh, triangle, k)
+    normal, turn = edge_normals(mesh, triangle, k)
+    normals[edges], turns[edges] = normal, turn
     precracked[edges] = mesh.debonded[mesh.edge_class[plane]]
     ends = mesh.class_keys[mesh.vertex_class[mesh.edges[plane]]]
     order, side = lattice.order, lattice.order / lattice.intervals
-    starts = np.zeros(len(edges)), np.full(len(edges), 1.0 - side)
-    length = np.stack([side_lengths(normal, turn, low, order, side)[:, -k] for k, low in enumerate(starts)], axis=1)
+    first = side_lengths(normal, turn, np.zeros(len(edges)), order, side)[:, 0]
+    last = side_lengths(normal, turn, np.full(len(edges), 1.0 - side), order, side)[:, -1]
+    length = np.stack([first, last], axis=1)
     unit = normal / np.maximum(np.linalg.norm(normal, axis=2), 1e-300)[..., None]
     bonded = np.broadcast_to(~precracked[edges, None], length.shape)
     parts = np.concatenate([unit * length[..., None], length[..., None], bonded[..., None]], axis=2)
@@ -218,13 +221,12 @@ def share_entities(
     nodes = np.where(sharers.is_edge, lattice.intervals - 1, 1)
     owner = table.rank[sharers.innermost]
     constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
-    begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
+    own_constraints = int(constraints.sum())
+    begin = comm.exscan(own_constraints) or 0
     numbers = begin + np.cumsum(constraints) - constraints
-    # The owner of an entity sends its number and geometry to the other sharers.
     rank, entity = table.rank[sharers.sharer], np.repeat(np.arange(len(owner)), sharers.copies)
     mine = (owner == comm.rank)[entity]
-    to = np.unique(entity[mine] * comm.size + rank[mine])
-    entity, to = to // comm.size, to % comm.size
+    entity, to = np.divmod(np.unique(entity[mine] * comm.size + rank[mine]), comm.size)
     columns = (column[entity] for column in (sharers.code, numbers, *geometry))
     code, *received = distributed_arrays.exchange(comm, to, *columns)
     place = np.argsort(code)

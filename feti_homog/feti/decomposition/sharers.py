@@ -69,10 +69,10 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
     corner = np.where(np.isin(corner, mesh.pinned), -1, corner)
     # Unique pairs: the code of an entity that subdomains may share, and a local subdomain at the entity.
-    vertices, edges = _several(corner, meshes.member, at_border), _several(side, meshes.member, one_sided)
-    kinds = (False, mesh.class_keys, *vertices), (True, mesh.edge_keys, *edges)
-    pairs = [(entity_code(keys[i], is_edge), meshes.index[member]) for is_edge, keys, i, member in kinds]
-    code, subdomain = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    vertex, at_vertex = _several(corner, meshes.member, at_border)
+    edge, at_edge = _several(side, meshes.member, one_sided)
+    code = np.concatenate([entity_code(mesh.class_keys[vertex], False), entity_code(mesh.edge_keys[edge], True)])
+    subdomain = meshes.index[np.concatenate([at_vertex, at_edge])]
     code, subdomain = distributed_arrays.exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
@@ -80,10 +80,8 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
     shared = copies[entity] > 1
     code, subdomain = code[shared], subdomain[shared]
     code, first, copies = np.unique(code, return_index=True, return_counts=True)
-    # Each rank with a sharer of an entity receives all sharers of this entity.
     entity = np.repeat(np.arange(len(code)), copies)
-    entity_and_rank = np.unique(entity * comm.size + table.rank[subdomain])
-    entity, to = entity_and_rank // comm.size, entity_and_rank % comm.size
+    entity, to = np.divmod(np.unique(entity * comm.size + table.rank[subdomain]), comm.size)
     code, count = distributed_arrays.exchange(comm, to, code[entity], copies[entity])
     whose = distributed_arrays.ranges(first[entity], copies[entity])
     (sharer,) = distributed_arrays.exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])

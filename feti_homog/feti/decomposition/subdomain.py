@@ -235,7 +235,8 @@ class Subdomain:
         apart = [np.argmax(((x - origin) ** 2).sum(axis=1))]
         if self.R.shape[1] >= 3:
             apart.append(np.argmax(((x - x[apart[0]]) ** 2).sum(axis=1)))
-            (dx, dy), (ex, ey) = x[apart[1]] - x[apart[0]], (x - x[apart[0]]).T
+            ex, ey = (x - x[apart[0]]).T
+            dx, dy = x[apart[1]] - x[apart[0]]
             apart.append(np.argmax(np.abs(dx * ey - dy * ex)))
         # On a straight line two nodes are enough, and the third repeats one of them.
         nodes = np.unique(candidates[apart])

@@ -84,7 +84,8 @@ class FollowedResponse:
         self._factors[:n] = self._factors[slots]
         if n + more > capacity:
             wider = np.zeros((len(self._buffer), 2 * (n + more)), order="F")
-            wider[:, :n], self._buffer = self._buffer[:, :n], wider
+            wider[:, :n] = self._buffer[:, :n]
+            self._buffer = wider
             new = wider.shape[1] - capacity
             self._used, self._factors = np.pad(self._used, (0, new)), np.pad(self._factors, [(0, new), (0, 0)])
 
@@ -156,7 +157,7 @@ class FollowedResponse:
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
         """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
-        self._make_room(len(rows))
+        self._make_room_for_waiting(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
         outer = np.outer(root, root)
@@ -174,11 +175,14 @@ class FollowedResponse:
         """
         columns, values = self._present(rows)
         forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
-        if len(loaded := self.pins[(np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)]):
-            rows, none = np.concatenate([rows, loaded]), np.zeros(len(loaded))
-            sign, gain = np.concatenate([sign, none + 1.0]), np.concatenate([gain, none])
+        is_loaded = (np.abs(forces[self._slot[self.pins]]) > thresholds.LEAST_FOLLOWED).any(axis=1)
+        loaded = self.pins[is_loaded]
+        if len(loaded):
+            rows = np.concatenate([rows, loaded])
+            sign, gain = np.append(sign, np.ones(len(loaded))), np.append(gain, np.zeros(len(loaded)))
             columns, values = self._present(rows)
-        if (k := len(rows)) > thresholds.WAITING_COLUMNS:
+        k = len(rows)
+        if k > thresholds.WAITING_COLUMNS:
             return False
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gain, 0.0))
         inverse = self._comm.bcast(_regular(block, sign, self._stiffness[rows], pivot))
@@ -188,7 +192,7 @@ class FollowedResponse:
         which, B, growth = inverse
         self.rounding += np.finfo(float).eps * growth
         if len(which):
-            self._make_room(len(which))
+            self._make_room_for_waiting(len(which))
             s, difference, places = sign[which], np.take(columns, which, axis=1), rows[which] - self._first
             mine = np.flatnonzero((places >= 0) & (places < len(columns)))
             places = places[mine]
@@ -208,8 +212,9 @@ class FollowedResponse:
             places = self.pins - self._first
             self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
             # Springs of pins have C_0, like springs of inactive rows.
-            if len(loose := loose[gain[loose] != 0.0]):
-                return self.soften(rows[loose], gain[loose], pivot)
+            softer = loose[gain[loose] != 0.0]
+            if len(softer):
+                return self.soften(rows[softer], gain[softer], pivot)
         return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
@@ -230,7 +235,7 @@ class FollowedResponse:
         self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
         self._count += k
 
-    def _make_room(self, k: int) -> None:
+    def _make_room_for_waiting(self, k: int) -> None:
         """Make room for `k` waiting columns."""
         if self._count + k > thresholds.WAITING_COLUMNS:
             self._apply_waiting()
@@ -240,8 +245,8 @@ class FollowedResponse:
         n, k = self._count, len(self._rows)
         if n and k and len(self._buffer):
             # In place: a separate product would take as much memory as all columns.
-            product = -1.0, self._waiting[:, :n], self._factors[:k, :n]
-            dgemm(*product, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
+            waiting, factors = self._waiting[:, :n], self._factors[:k, :n]
+            dgemm(-1.0, waiting, factors, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
         self._count = 0
 
 

@@ -64,7 +64,8 @@ class AssembledSchur:
         minus_copies, of_inner = -jump_operator.copies[rows, 1].astype(float), operators.of_inner.astype(float)
         e = diags(minus_copies) @ operators.B[rows] @ diags(of_inner)
         square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
-        rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
+        is_local = square > 0
+        rows, e, square = rows[is_local], e.tocsr()[is_local], square[is_local]
         entries = np.ones(len(rows)), (np.arange(len(rows)), number[rows])
         directions = csr_matrix(entries, shape=(len(rows), sum(counts)))
         common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()

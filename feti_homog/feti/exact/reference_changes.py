@@ -68,9 +68,9 @@ class ReferenceChanges:
         """
         entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
         active = distributed_arrays.gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
-        roots = (np.sqrt(stiffness[numbers]) for numbers in (self.rows, rows))
-        pairs = zip((self._signs[:, 0] <= 0.0, active), roots, strict=True)
-        units = np.multiply.outer(*(np.where(is_active, 1.0 / root, root) for is_active, root in pairs))
+        root, root_of_C = np.sqrt(stiffness[rows]), np.sqrt(stiffness[self.rows])
+        unit_of_C = np.where(self._signs[:, 0] <= 0.0, 1.0 / root_of_C, root_of_C)
+        units = np.multiply.outer(unit_of_C, np.where(active, 1.0 / root, root))
         error, largest = (np.abs(units * x).max(initial=0.0) for x in (entries - followed, entries))
         return float(self._comm.bcast(error / max(largest, 1.0)))
 

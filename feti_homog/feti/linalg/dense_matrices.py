@@ -19,8 +19,8 @@ from feti_homog.typing import Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.linalg.partial_cholesky import PartialFactor
 
-# INFOG(1) of MUMPS if the workspace is too small, and percentages that are added to its estimate, one after the other.
-TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
+TOO_SMALL = (-8, -9)  # INFOG(1) of MUMPS if its workspace is too small
+MORE_WORKSPACE = (None, 100, 1000)  # percentages that are added to its estimate, one after the other
 
 
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
@@ -42,7 +42,8 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     matrix.data *= scale
     A = sequential(matrix)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    index_set, pc = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF), PETSc.PC()
+    index_set = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    pc = PETSc.PC()
     try:
         for workspace in MORE_WORKSPACE:
             pc.destroy()

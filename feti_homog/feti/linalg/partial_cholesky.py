@@ -123,8 +123,10 @@ class PartialFactor:
         self._place = np.empty(n, np.int64)
         self._place[post] = np.arange(n)
         parent = np.where(parent[post] < 0, -1, self._place[parent[post]]).astype(np.int32)
-        permuted, factor = np.ascontiguousarray(requested[post]), self._factor.contents
-        _array(factor.Perm, n, c_int)[:], _array(factor.ColCount, n, c_int)[:] = permuted, count[post]
+        permuted = np.ascontiguousarray(requested[post])
+        factor = self._factor.contents
+        _array(factor.Perm, n, c_int)[:] = permuted
+        _array(factor.ColCount, n, c_int)[:] = count[post]
         factor.ordering = GIVEN
         upper = library.cholmod_ptranspose(byref(matrix), XType.PATTERN, _address(permuted), None, c_size_t(0), common)
         done = upper and library.cholmod_super_symbolic(upper, None, _address(parent), self._factor, common)

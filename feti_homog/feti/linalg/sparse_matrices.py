@@ -112,17 +112,17 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
         return part
     numbers = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
     A = assemble_distributed(comm, part[numbers][:, numbers], numbers, part.shape[0])
-    parts = A.getValuesCSR()
+    indptr, columns, data = A.getValuesCSR()
     A.destroy()
-    counts, entries = (np.array(comm.allgather(n)) for n in (len(parts[0]) - 1, len(parts[1])))
-    lengths = distributed_arrays.allgather_rows(comm, np.diff(parts[0]), counts)
-    indices, values = (distributed_arrays.allgather_rows(comm, x, entries) for x in parts[1:])
+    counts, entries = (np.array(comm.allgather(n)) for n in (len(indptr) - 1, len(columns)))
+    lengths = distributed_arrays.allgather_rows(comm, np.diff(indptr), counts)
+    indices, values = (distributed_arrays.allgather_rows(comm, x, entries) for x in (columns, data))
     return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
 
 
 def _even_share(comm: MPI.Intracomm, n: int) -> int:
     """Return the number of rows of this rank in an even distribution of n rows."""
-    return n // comm.size + (comm.rank < n % comm.size)
+    return n // comm.size + (1 if comm.rank < n % comm.size else 0)
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:

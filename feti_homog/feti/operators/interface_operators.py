@@ -170,8 +170,8 @@ class InterfaceOperators:
             SubdomainSize(s.n_dofs, len(dofs), s.submesh.index not in pieces, not s.is_outer and root is not None)
             for s, dofs, root in zip(subdomains, self.dofs, roots, strict=True)
         ]
-        how = kind, applications, soft_modes, PETSc.Sys.hasExternalPackage("mumps"), thresholds
-        explicit, self.facewise = choose(sizes, *how)
+        has_mumps = PETSc.Sys.hasExternalPackage("mumps")
+        explicit, self.facewise = choose(sizes, kind, applications, soft_modes, has_mumps, thresholds)
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
         self.interiors: dict[int, one_subdomain.Interior] = {}
@@ -253,8 +253,8 @@ class InterfaceOperators:
             return operator.extend(x, loads)
         if isinstance(operator, one_subdomain.ImplicitInterfaceOperator):
             interior = operator.interior
-        elif (stored := self.interiors.get(place)) is not None:
-            interior = stored
+        elif place in self.interiors:
+            interior = self.interiors[place]
         else:
             interior = one_subdomain.Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
             if keep:

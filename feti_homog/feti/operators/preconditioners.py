@@ -81,8 +81,7 @@ class StiffnessScaled(Preconditioner):
     def __init__(self, operators: InterfaceOperators, stiffness: Callable[[Float], Float]) -> None:
         """Compute B D^-1 and W; `stiffness` maps x (boundary dofs,) or (boundary dofs, k) to S x.  Collective."""
         self.jump_operator, self.stiffness = operators.jump_operator, stiffness
-        # All dofs of a node are on the boundary.
-        c = self.jump_operator.components
+        c = self.jump_operator.components  # all dofs of a node are on the boundary
         flexibility = diags(np.repeat(1.0 / operators.diagonal.reshape(-1, c).mean(axis=1), c))
         self.BD: csr_matrix = (operators.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()

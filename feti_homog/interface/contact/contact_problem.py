@@ -90,12 +90,15 @@ class ContactProblem:
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
         """Return C / C_0 (k, 3) for pulled and for pressed bonds; None if all are 1."""
-        if not (self._last and self._last[0][0] is bonds):
-            pulled, soft, stiff = np.ones(len(bonds.status), bool), None, None
-            if self.softening is not None:
-                soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
-            self._last[:] = [(bonds, None if soft is None or stiff is None else (soft, stiff))]
-        return self._last[0][1]
+        if self._last and self._last[0][0] is bonds:
+            return self._last[0][1]
+        factors = None
+        if self.softening is not None:
+            pulled = np.ones(len(bonds.status), bool)
+            soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
+            factors = None if soft is None or stiff is None else (soft, stiff)
+        self._last[:] = [(bonds, factors)]
+        return factors
 
     def _gained(self, bonds: BondState) -> Float:
         """Return C - C_0 (k,) of damaged normal springs; 0 at other nodes and in the axial problem."""
@@ -163,10 +166,8 @@ class ContactProblem:
         """Solve for equilibria under n strains (n, v) at fixed statuses, from n multipliers `starts`.  Collective."""
         self.prepare(bonds)
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
-        return [
-            self._equilibrium(Load.strain(strain), bonds, solution, solution.iterations, 1)
-            for strain, solution in zip(strains, solutions, strict=True)
-        ]
+        pairs = zip(strains, solutions, strict=True)
+        return [self._equilibrium(Load.strain(E), bonds, solution, solution.iterations, 1) for E, solution in pairs]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
@@ -179,7 +180,6 @@ class ContactProblem:
             closed = np.where(bonds.status == OPEN, CLOSED, bonds.status).astype(np.int8)
             if not self.contact or not self._any(closed != bonds.status):
                 raise
-        # Touching faces may carry loads that open faces do not.
         return self._search(load, bonds.with_status(closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
@@ -203,7 +203,8 @@ class ContactProblem:
             if pivots <= 0:
                 # Only the first wrong node changes, on the first rank that has a wrong node.
                 rank = comm.allreduce(comm.rank if wrong.any() else comm.size, MPI.MIN)
-                wrong = np.arange(len(wrong)) == (np.argmax(wrong) if rank == comm.rank else -1)
+                place = np.argmax(wrong) if rank == comm.rank else -1
+                wrong = np.arange(len(wrong)) == place
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:

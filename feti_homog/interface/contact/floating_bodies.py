@@ -64,7 +64,7 @@ class _Fibres:
         opening = self.opening[nodes]
         ends = [0, *(np.flatnonzero(np.diff(self.fibre[nodes])) + 1), len(nodes)]
         for first, last in pairwise(ends) if len(nodes) else ():
-            columns = np.unique(opening.indices[slice(*opening.indptr[[first, last]])])
+            columns = np.unique(opening.indices[opening.indptr[first] : opening.indptr[last]])
             motions, modes = opening[first:last, columns].toarray(), np.zeros((len(columns), 0))
             if motions.size:
                 _, size, basis = np.linalg.svd(motions, full_matrices=False)
@@ -98,7 +98,9 @@ class _Fibres:
             a, b = before[node], after[node]
             if not motion.shape[1]:
                 shares.append(shares_to_zero(a, b, noise))
-            elif (certain := _last_share(a, b, motion, 2 * noise)) < 1.0:
+                continue
+            certain = _last_share(a, b, motion, 2 * noise)
+            if certain < 1.0:
                 shares.append((_last_share(np.maximum(a, 0.0), b, motion, 0.0), certain))
         begins, certain = np.min(shares, axis=0)
         return float(begins), float(certain)
@@ -152,13 +154,14 @@ class FloatingBodies:
         parts = self.comm.gather((self.is_open, opening, self.nodes.bodies, reach, *gaps))
 
         def decided() -> T:
-            is_open, opening, bodies, reach, *gaps = zip(*(parts or []), strict=True)
+            is_open, openings, bodies, reaches, *gaps = zip(*(parts or []), strict=True)
             # A body between two fibres links their motions, unless the body is pinned.
             pairs, fixed = np.concatenate(bodies), self.coarse.pinned_body
-            (outer, inner), between = pairs.T, (pairs != fixed).all(axis=1)
+            outer, inner = pairs.T
+            between = (pairs != fixed).all(axis=1)
             labels = periodic_topology.components(int(pairs.max(initial=0)) + 1, outer[between], inner[between])
             groups = np.asarray(labels[np.where(inner == fixed, outer, inner)])
-            fibres = _Fibres(np.concatenate(is_open), vstack(opening).tocsr(), np.max(reach, axis=0), groups)
+            fibres = _Fibres(np.concatenate(is_open), vstack(openings).tocsr(), np.max(reaches, axis=0), groups)
             return decide(fibres, *map(np.concatenate, gaps), self.noise)
 
         return mpi_errors.on_root(self.comm, decided)

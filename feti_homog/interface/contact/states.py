@@ -141,20 +141,17 @@ def kkt_errors(
         acting: (v,) sizes of the loads that impose displacement and stress.
     """
     comm, length = scales.solver.comm, scales.solver.jump_operator.nodes.length
-    displacement, stress, over_interface = scales.imposed(acting), scales.bond_stress(acting), scales.over_interface
+    stress, over_interface = scales.bond_stress(acting), scales.over_interface
     force = traction[:, 0] * length
     largest_traction = np.maximum(over_interface(np.abs(traction).max(axis=1, initial=0.0)), stress)
     largest_force = np.maximum(over_interface(np.abs(force)), stress * over_interface(length))
     # If no load acts, errors are absolute.
-    displacement = displacement or 1.0
+    displacement = scales.imposed(acting) or 1.0
     largest_traction, largest_force = (np.where(size > 0.0, size, 1.0) for size in (largest_traction, largest_force))
-    worst = np.array(
-        [
-            np.where(debonded, -gap, 0.0).max(initial=0.0) / displacement,
-            np.where(debonded & closed, traction[:, 0] / largest_traction, 0.0).max(initial=0.0),
-            np.where(debonded, np.abs(force * gap) / (largest_force * displacement), 0.0).max(initial=0.0),
-        ]
-    )
+    penetration = np.where(debonded, -gap, 0.0).max(initial=0.0) / displacement
+    tension = np.where(debonded & closed, traction[:, 0] / largest_traction, 0.0).max(initial=0.0)
+    work = np.where(debonded, np.abs(force * gap) / (largest_force * displacement), 0.0).max(initial=0.0)
+    worst = np.array([penetration, tension, work])
     comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
     return dict(zip(("kkt_penetration", "kkt_tension", "kkt_complementarity"), worst.tolist(), strict=True))
 

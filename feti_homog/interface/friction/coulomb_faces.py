@@ -145,9 +145,9 @@ class StatusSearch:
 
     def _improved(self, status: Status, x: Float) -> Status:
         """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
-        faces, allowed, slip, last = self.faces, self.allowed, self.load.slip, 2 * self.faces.nodes
+        faces, allowed, noise = self.faces, self.allowed, self.faces.noise(x)
         normal, tangential = faces.forces(x)
-        noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip
+        gap, moved = x[faces.gaps], x[faces.slips] - self.load.slip
         better, closed = status.copy(), status != OPEN_FACE
         limit = -faces.friction * normal
         pulled = closed & (normal > noise) & allowed[:, OPEN_FACE]
@@ -237,23 +237,22 @@ class CoulombFaces(FaceSystem):
 
     def _at_limits(self, status: Status, x: Float, noise: Float) -> Bool:
         """Return the mask (n, 4) of allowed statuses: present statuses and, at limits up to `noise`, the next ones."""
-        closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
+        closed = status != OPEN_FACE
         normal, tangential = self.forces(x)
         allowed = np.zeros((self.nodes, 4), bool)
         allowed[np.arange(self.nodes), status] = True
         for sign in (FORWARD, BACKWARD):
             limited = closed & ((status == sign) | (sign * tangential + self.friction * normal >= -noise))
             allowed[limited, sign] = allowed[limited, STICK] = True
-        allowed[np.where(closed, normal >= -noise, gap <= noise)] = True
-        allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
-        return allowed
+        allowed[np.where(closed, normal >= -noise, x[self.gaps] <= noise)] = True
+        return allowed & self.all_allowed()
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
         """Return the time until a node leaves its status while x changes at `rate`; inf if no node does."""
         noise, closed = self.noise(rate), status != OPEN_FACE
         (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
-        sticks, last = status == STICK, 2 * self.nodes
-        rooms = [(x[:last:2], rate[:last:2], ~closed), (-normal, -dn, closed)]
+        sticks = status == STICK
+        rooms = [(x[self.gaps], rate[self.gaps], ~closed), (-normal, -dn, closed)]
         for sign in (FORWARD, BACKWARD):
             room, slope = -self.friction * np.stack([normal, dn]) - sign * np.stack([tangential, dt])
             rooms.append((room, slope, sticks))
@@ -264,7 +263,7 @@ class CoulombFaces(FaceSystem):
     def heat(self, status: Status, before: Float, after: Float) -> float:
         """Return the heat of a straight path at fixed statuses: mean friction forces times slips, at sliding nodes."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
-        return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
+        return float((tangential * (after - before)[self.slips])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
         """Return the energy lost on the straight path between states x at constant load, and the heat in this loss."""
@@ -274,5 +273,5 @@ class CoulombFaces(FaceSystem):
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
         """Return the heat of an implicit step: final friction forces times slips, at sliding nodes."""
-        slips = (after - before)[1 : 2 * self.nodes : 2]
+        slips = (after - before)[self.slips]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

@@ -45,13 +45,15 @@ class FaceSystem:
         friction: (n,) mu.
         S: (m, m) scaled stiffness of x = (g, E), with 1 as the largest diagonal entry of each node.
         size: (m,) units, m = 2n + v: the stiffness is S_ij size_i size_j.
-        nodes, loads: the number n of nodes, and the indices of the v loads E in x.
+        nodes: number n of nodes.
+        gaps, slips, loads: slices of g_n, g_t and the v loads E in x.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
         """Scale the stiffness (m, m) of n pairs of jumps (normal, tangential), then v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
-        self.friction, self.nodes, self.loads = friction, n, slice(2 * n, len(stiffness))
+        self.friction, self.nodes = friction, n
+        self.gaps, self.slips, self.loads = slice(0, 2 * n, 2), slice(1, 2 * n, 2), slice(2 * n, len(stiffness))
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
@@ -64,8 +66,8 @@ class FaceSystem:
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """Return the scaled normal and tangential forces (n,) in a state x, tension positive."""
-        f = -self.product(x)[: 2 * self.nodes]
-        return f[::2], f[1::2]
+        f = -self.product(x)
+        return f[self.gaps], f[self.slips]
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
         """Take over the factored response of `before`, changed in place by `FollowedStatuses.grow`, if it can grow."""
@@ -108,7 +110,8 @@ class FaceSystem:
     def sign(self, status: Status, by_stress: Bool) -> int:
         """Return the sign of det M, see `status_system`, with given statuses; 0 with free motions."""
         rows = status_system.free_rows(status, self.friction, by_stress)
-        return (self._turned(*rows) or self._system(*rows)).sign
+        followed = self._turned(*rows)
+        return self._system(*rows).sign if followed is None else followed.sign
 
     def _turned(self, free: Bool, slope: Float) -> status_system.FollowedStatuses | None:
         """Return `FollowedStatuses` with rows from `free_rows`; None at a tiny pivot, or while factoring is cheaper."""
@@ -128,7 +131,8 @@ class FaceSystem:
 
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) solved anew without accumulated rounding; with a free motion, x stays."""
-        return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
+        has_free_motion = self.sign(status, load.by_stress) == 0
+        return status, (x if has_free_motion else self.linear(status, load, x)[0])
 
     def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
         """Return whether no force drives a free motion, such as a fibre that turns in a hole."""
@@ -148,16 +152,16 @@ class FaceSystem:
         fixed, rows = np.zeros((2, len(self.S)))
         rows[self.loads] = load.values
         fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
-        fixed[1 : 2 * self.nodes : 2] = np.where(status == status_system.STICK, load.slip, 0.0)
+        fixed[self.slips] = np.where(status == status_system.STICK, load.slip, 0.0)
         return np.asarray(np.abs(rows) + self.terms(self.terms(fixed)))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
-        last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
-        x[:last:2] = np.where(status == status_system.OPEN_FACE, x[:last:2], 0.0)
-        x[1:last:2] = np.where(status == status_system.STICK, load.slip, x[1:last:2])
-        x[loads] = np.where(load.by_stress, x[loads], load.values)
-        rows[loads] = load.values
+        x, rows = start.copy(), np.zeros(len(start))
+        x[self.gaps] = np.where(status == status_system.OPEN_FACE, x[self.gaps], 0.0)
+        x[self.slips] = np.where(status == status_system.STICK, load.slip, x[self.slips])
+        x[self.loads] = np.where(load.by_stress, x[self.loads], load.values)
+        rows[self.loads] = load.values
         return x, rows
 
     def noise(self, x: Float) -> Float:

@@ -18,17 +18,8 @@ from scipy.linalg import block_diag, lu_factor, lu_solve
 
 from feti_homog.errors import CaseError
 from feti_homog.feti import DualSolution, solver_plan
-from feti_homog.interface.contact import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    BondState,
-    ContactProblem,
-    CoupledInterfaces,
-    Equilibrium,
-    Status,
-)
-from feti_homog.interface.contact.states import coulomb_errors
+from feti_homog.interface.contact import BondState, ContactProblem, CoupledInterfaces, Equilibrium, Status
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, coulomb_errors
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import HELD, INVERSE_ITERATIONS, OPEN_FACE, STICK, UNRESISTED
 from feti_homog.interface.loads import Load, Macroscopic
@@ -52,9 +43,8 @@ class CondensedProblem:
             raise CaseError(solver_plan.WITHOUT_INVERSE)
         self._inverse, self.first = self.solver.exact_inverse, self.solver.jump_operator.owned[0]
         self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
-        bonded = self.solver.torn_stiffness + distributed_arrays.allreduce_sum(
-            self.solver.comm, self.solver.d.T @ self._response
-        )
+        glued = distributed_arrays.allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
+        bonded = self.solver.torn_stiffness + glued
         self._bonded = (bonded + bonded.T) / 2
         self._some: tuple[Int, Float] | None = None
 
@@ -119,7 +109,8 @@ class AxialFaces:
 
     def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
         """Condense the problem to rows (n,) with springs (n,), 0 for free faces.  Collective."""
-        self.problem, (K, b, L) = problem, problem.take(rows, springs)
+        self.problem = problem
+        K, b, L = problem.take(rows, springs)
         factor = lu_factor(K + HELD * np.diag(K.diagonal()))
         self.jumps = np.zeros_like(b)
         for _ in range(1 + INVERSE_ITERATIONS):
@@ -165,13 +156,13 @@ class SlidingCell:
         self._held = np.flatnonzero(bonds.status == BONDED)
         self._held_rows = [problem.rows_of(self._held) for problem in problems]
         pulled = (gained > 0.0) & self._damaged[:, None]
-        self._springs = springs = np.divide(1.0, gained, out=np.zeros_like(gained), where=pulled)
+        self._springs = np.divide(1.0, gained, out=np.zeros_like(gained), where=pulled)
         self._mu = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [problem.first + problem.interface.nodes.row for problem in self._axial]
-        table = np.column_stack([first + row, self._mu, *along, springs])[self._face_nodes]
+        table = np.column_stack([first + row, self._mu, *along, self._springs])[self._face_nodes]
         table = np.concatenate(comm.allgather(table))
         table = table[np.argsort(table[:, 0])]
-        faces, before, old = self.faces, self.rows, self.springs
+        faces_before, rows_before, springs_before = self.faces, self.rows, self.springs
         self.rows, springs = table[:, 0].astype(np.int64), table[:, -gained.shape[1] :]
         self.springs = springs[:, :2].ravel()
         self._position = np.searchsorted(self.rows, first + row[self._face_nodes])
@@ -180,13 +171,13 @@ class SlidingCell:
         S = block_diag(L, *(problem.stiffness for problem in self._along))
         b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), table[:, 1])
-        if len(before) and np.isin(before, self.rows).all():
-            pairs = (2 * np.searchsorted(self.rows, before)[:, None] + np.arange(2)).ravel()
+        if len(rows_before) and np.isin(rows_before, self.rows).all():
+            pairs = (2 * np.searchsorted(self.rows, rows_before)[:, None] + np.arange(2)).ravel()
             loads = np.arange(self.faces.loads.start, self.faces.loads.stop)
             # Entries whose springs differ, and the axial loads, whose stiffness depends on all jumps.
-            differs = np.repeat((self.springs[pairs] != old).reshape(-1, 2).any(axis=1), 2)
+            differs = np.repeat((self.springs[pairs] != springs_before).reshape(-1, 2).any(axis=1), 2)
             other = np.concatenate([pairs[differs], loads[self._loads :]])
-            self.faces.follow(faces, np.concatenate([pairs, loads]), other)
+            self.faces.follow(faces_before, np.concatenate([pairs, loads]), other)
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
         """Condense the cell to `bonds`, and return face statuses (n,) and x (m,) at a strain (v,).  Collective.
@@ -204,15 +195,15 @@ class SlidingCell:
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
         """Return this rank's bonds with face statuses (n,) and the jumps in x; damaged bonds stay BONDED."""
-        face, jump = status[self._position], np.zeros((len(before.status), 2))
-        jump[self._face_nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
-        nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
-        holds, pressed = self._damaged[self._face_nodes], before.pressed.copy()
-        nodes[self._face_nodes] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
-        rubs = self.faces.friction[self._position] > 0.0
-        sliding[self._face_nodes] = np.where((face != OPEN_FACE) & rubs, face, STICK)
-        pressed[self._face_nodes] = np.where(holds, face != OPEN_FACE, pressed[self._face_nodes])
-        return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
+        nodes, face = self._face_nodes, status[self._position]
+        holds, rubs = self._damaged[nodes], self.faces.friction[self._position] > 0.0
+        jump, sliding = np.zeros((len(before.status), 2)), np.zeros(len(before.status), np.int8)
+        jump[nodes] = self._jumps_of(x).reshape(-1, 2)[self._position]
+        sliding[nodes] = np.where((face != OPEN_FACE) & rubs, face, STICK)
+        contact, pressed = before.status.copy(), before.pressed.copy()
+        contact[nodes] = np.where(holds, BONDED, np.where(face == OPEN_FACE, OPEN, CLOSED))
+        pressed[nodes] = np.where(holds, face != OPEN_FACE, pressed[nodes])
+        return replace(before, status=contact, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
     def stored(self, x: Float) -> float:
         """Return the energy per area that the cell stores in the state x."""
@@ -240,12 +231,13 @@ class SlidingCell:
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
         """Return each condensed problem with its unscaled jumps and strains in x."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
-        return [(self._plane, (jump, plane)), *((axial.problem, (axial.jumps @ along, along)) for axial in self._along)]
+        axial = [(faces.problem, (faces.jumps @ along, along)) for faces in self._along]
+        return [(self._plane, (jump, plane)), *axial]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
         """Return the axial energy per area that a break at constant load releases."""
-        parts = (Macroscopic(state.strain[self._loads :], state.stress[self._loads :]) for state in (before, after))
-        return next(parts).released_to(next(parts))
+        axial = [Macroscopic(state.strain[self._loads :], state.stress[self._loads :]) for state in (before, after)]
+        return axial[0].released_to(axial[1])
 
     def macroscopic(self, x: Float) -> Macroscopic:
         """Return the macroscopic strains and stresses (v,) of all problems in the state x."""
@@ -263,17 +255,17 @@ class SlidingCell:
         All `loads` scale the certificate; `kkt_friction` is the largest of `coulomb_errors` relative to the largest
         traction.
         """
-        states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
+        of_problems = list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()
         for scale, problem_loads in zip(scales, of_problems, strict=True):
             asked.append(np.max([scale.asked(load) for load in problem_loads], axis=0))
         # Rounding in an unloaded problem is as large as in the loaded problem.
-        largest = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
+        largest_strain = max(scale.imposed_strain(strain).max() for scale, strain in zip(scales, asked, strict=True))
         # Forces of springs come from the jumps in x: jumps by F lambda would be divided by a vanishing compliance.
-        acting, jumps = list[Float](), list[Float]()
+        states, acting, jumps = list[Equilibrium](), list[Float](), list[Float]()
         for problem_loads, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
-            strains[: problem.solver.problem.strains] = largest
+            strains[: problem.solver.problem.strains] = largest_strain
             certificate = problem.interface.certificate(bonds, solution, strains)
             states.append(Equilibrium(problem_loads[-1], bonds, solution, 0, 1, 0, certificate, strains))
             acting.append(problem.interface.scales.acting(strain, strains))
@@ -295,4 +287,4 @@ class SlidingCell:
         excess = np.where((bonds.status == BONDED) & ~self._damaged, 0.0, excess)
         excess /= np.where(largest > 0.0, largest, 1.0)
         error = {"kkt_friction": float(self.solver.comm.allreduce(excess.max(initial=0.0), MPI.MAX))}
-        return replace(plane, certificate=plane.certificate | error, axial=next(iter(axial), None))
+        return replace(plane, certificate=plane.certificate | error, axial=axial[0] if axial else None)

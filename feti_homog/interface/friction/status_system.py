@@ -258,8 +258,7 @@ class FollowedStatuses:
         free[old], slope[old], position[old], position[new] = self.free, self.slope, self._index, np.arange(size, m)
         self.S, self.free, self.slope, self._index = S, free, slope, position
         if m > self._R.shape[1]:
-            # Leave room for more entries.
-            R = np.empty((2, m + m // 4, m + m // 4))
+            R = np.empty((2, m + m // 4, m + m // 4))  # with room for more entries
             R[:, :size, :size] = self._R[:, :size, :size]
             self._R = R
             self._forget()

@@ -48,8 +48,10 @@ class SectionValues:
 
     def everywhere(self, key: str, *more: str) -> Float:
         """Return the values (s,) in all s sections, for the factor 1, equal on every rank; (inf,) without sections."""
-        names = (key, *more)
-        values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
+        values = []
+        for bond in self.bonds:
+            candidates = [getattr(bond, name) for name in (key, *more)]
+            values.append(next((value for value in candidates if value is not None), math.inf))
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:

@@ -137,14 +137,14 @@ class ReleasedEnergy(SpringEnergy):
         at_tips = np.flatnonzero((all_status == BONDED) & (neighbours.adjacency @ (all_status != BONDED) > 0))
         is_local = (at_tips >= first) & (at_tips < first + len(bonds.status))
         rows = neighbours.rows[at_tips][:, None] + np.arange(2)
-        H, axial = self.influence.inverse_blocks(rows)[is_local], np.zeros(0)
-        stiffness = self.influence.stiffness[rows[is_local]]
-        node, number = at_tips[is_local] - first, np.full(len(bonds.status), -1)
+        H = self.influence.inverse_blocks(rows)[is_local]
+        stiffness, axial = self.influence.stiffness[rows[is_local]], np.zeros(0)
         if self.axial is not None:
             self._activate(self.axial, cell.problems[1], bonds)
-            rows = self.axial.neighbours.rows[at_tips]
-            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[is_local, 0, 0]
-            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[is_local]]])
+            axial_rows = self.axial.neighbours.rows[at_tips]
+            axial = self.axial.inverse_blocks(np.stack([axial_rows, axial_rows], axis=1))[is_local, 0, 0]
+            stiffness = np.column_stack([stiffness, self.axial.stiffness[axial_rows[is_local]]])
+        node, number = at_tips[is_local] - first, np.full(len(bonds.status), -1)
         number[node] = np.arange(len(node))
         tips = TipEnergies(H, cell.nodes.length[node], stiffness, axial)
         springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}

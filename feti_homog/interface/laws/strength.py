@@ -27,9 +27,8 @@ class Strength(BondLaw):
     @classmethod
     def of_keys(cls, value: SectionValues) -> Self:
         """Make the law from [interface] keys; the axial strength defaults to the tangential strength."""
-        return cls(
-            value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")
-        )
+        axial = value("axial_strength", "tangential_strength")
+        return cls(value("normal_strength"), value("tangential_strength"), axial)
 
     def share(self, traction: Float) -> Float:
         """Return the utilisation (p,) under tractions (p, c)."""

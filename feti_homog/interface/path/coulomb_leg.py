@@ -80,7 +80,7 @@ class CoulombLeg(Leg):
     def _given(self, share: float, x: Float) -> Prescribed:
         """Return the prescribed load at a leg fraction, with the slips in scaled x."""
         load = self._load_at(share)
-        return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
+        return Prescribed(load.by_stress, self.sliding.given(load), x[self.sliding.faces.slips])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
         """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""
@@ -102,8 +102,7 @@ class CoulombLeg(Leg):
         self._mean, faces = begin.last, sliding.faces
         status, after = self._on_root(faces.search, status, faces.all_allowed(), self._given(self._share, x), x)
         lost, heat = (loss / self.cell.area for loss in faces.losses(status, x, after))
-        # Softening bonds lose the energy of their springs.
-        lost += begin.stretched - sliding.stretched(x)
+        lost += begin.stretched - sliding.stretched(x)  # softening bonds lose the energy of their springs
         lost += sliding.released_along(begin.last, sliding.macroscopic(after))
         self._go_straight(status, after, lost - heat, heat, begin.broken)
         self._first = True

@@ -88,8 +88,7 @@ class FrictionlessLeg(Leg):
         """
         cell, before, start = self.cell, self._state, self._share
         try:
-            # The solutions at the end of the leg with fixed contact states.
-            end = cell.linear(self.end, before.bonds, before.multipliers)
+            end = cell.linear(self.end, before.bonds, before.multipliers)  # with fixed contact states
         except NotCarriedError:
             beyond = min(start + SAME_SHARE, 1.0)
             touching = self._solve(beyond, before.bonds, before.multipliers)
@@ -100,18 +99,20 @@ class FrictionlessLeg(Leg):
             return
         # Fractions of the leg at which a bond breaks, contact begins to change, and contact surely has changed; or inf.
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
-        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
-        begins, certain = (np.inf, np.inf) if begins == 1.0 else (begins, certain)
+        change = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
+        begins, certain = change if change[0] != 1.0 else (np.inf, np.inf)
         breaks, begins, certain = (start + (1.0 - start) * way for way in (breaks, begins, certain))
         target = min(breaks, begins, 1.0)
         is_here = target - start <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
         is_due = reached and target == breaks and self._is_due()
-        is_reported, turned = self._share <= self._reported + SAME_SHARE, False
+        is_reported = self._share <= self._reported + SAME_SHARE
+        turned = False
         if reached and target == begins and not is_due:
             # Beyond the state in which contact begins to change, the change is beyond doubt; faces that touch without a
             # force may have opened since `before`.
-            state, beyond = self._state, min(max(min(breaks, certain), self._share + SAME_SHARE), 1.0)
+            state = self._state
+            beyond = min(max(min(breaks, certain), self._share + SAME_SHARE), 1.0)
             if not is_reported:
                 yield self._turn(beyond)
             self._stand(beyond, self._solve(beyond, state.bonds, state.multipliers))

@@ -122,7 +122,8 @@ class Leg(ABC):
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
         """Return the point at s, for numbers of bonds that part and soften; the energy sum starts anew.  Collective."""
-        energies, self._energies, self._reported = self._energies, path_points.NO_ENERGIES, self._share
+        energies, self._energies = self._energies, path_points.NO_ENERGIES
+        self._reported = self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return path_points.Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)
 

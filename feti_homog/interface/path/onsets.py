@@ -55,25 +55,24 @@ class Onset:
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
-        used, factors = self.utilisation(direction.reshape(-1, c), node), np.full(n * k, np.inf)
+        along = direction.reshape(-1, c)
+        used, factors = self.utilisation(along, node), np.full(n * k, np.inf)
         loaded = np.flatnonzero(used > np.broadcast_to(noise.reshape(n, -1), (n, k)).ravel())
         if before is None:
             factors[loaded] = 1.0 / used[loaded]
-        else:
-            nodes, along = node[loaded], direction.reshape(-1, c)[loaded]
-            bonds, start, ray, used = self.bonds.at(nodes), before[nodes], ray[loaded], used[loaded]
-            exact = bonds.first_factor(start, along)
-            if exact is None:
-                # Bisection, without bonds that break after another bond under the same ray.
-                lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
-                first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
-                np.minimum.at(first, ray[is_convex], upper[is_convex])
-                rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
-                exact = np.full(len(used), np.inf)
-                exact[rivals] = bonds.at(rivals).crossing(
-                    start[rivals], along[rivals], np.zeros(len(rivals)), upper[rivals]
-                )
-            factors[loaded] = exact
+            return factors.reshape(n, k)
+        ray, node, along, used = ray[loaded], node[loaded], along[loaded], used[loaded]
+        bonds, start = self.bonds.at(node), before[node]
+        exact = bonds.first_factor(start, along)
+        if exact is None:
+            # Bisection, without bonds that break after another bond under the same ray.
+            lower, upper = (1.0 - bonds.share(start)) / used, (1.0 + bonds.share(-start)) / used
+            first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
+            np.minimum.at(first, ray[is_convex], upper[is_convex])
+            rivals = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+            low, exact = np.zeros(len(rivals)), np.full(len(used), np.inf)
+            exact[rivals] = bonds.at(rivals).crossing(start[rivals], along[rivals], low, upper[rivals])
+        factors[loaded] = exact
         return factors.reshape(n, k)
 
 
@@ -108,17 +107,16 @@ def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolutio
     damaged = interface.damaged(state.bonds)
     in_contact = (state.status == CLOSED) | damaged
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[in_contact]
-    before, after = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
-    shares = [shares_to_zero(before, after, tension[in_contact])]
-    # Without contact, faces may overlap.
-    is_open = (state.status == OPEN) & interface.contact
-    before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
+    force, force_at_end = (pressure * lam[nodes.row][in_contact] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(force, force_at_end, tension[in_contact])]
+    is_open = (state.status == OPEN) & interface.contact  # without contact, faces may overlap
+    gap, gap_at_end = state.solution.jump[nodes.row], end.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
     if interface.contact and solver.natural.unconstrained_modes.shape[1]:
         bodies = FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise)
-        shares.append(bodies.admissible_share(before, after))
+        shares.append(bodies.admissible_share(gap, gap_at_end))
     else:
-        shares.append(shares_to_zero(before[is_open], after[is_open], noise))
+        shares.append(shares_to_zero(gap[is_open], gap_at_end[is_open], noise))
     first = np.min(shares, axis=0)
     solver.comm.Allreduce(MPI.IN_PLACE, first, MPI.MIN)
     return float(first[0]), float(first[1])

@@ -40,8 +40,7 @@ def events(
         for point in points:
             yield point
             if not point.state.converged:
-                # The next break cannot follow from a wrong state.
-                return
+                return  # the next break cannot follow from a wrong state
             begin = point.after
 
 

@@ -102,8 +102,7 @@ def break_bonds(
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)
     status = cell.plane.debond(state.status, parts, state.multipliers[0])
-    # A first guess for the search of contact states.
-    pressed = np.where(which, traction[:, 0] < 0.0, bonds.pressed)
+    pressed = np.where(which, traction[:, 0] < 0.0, bonds.pressed)  # a first guess for the search of contact states
     energy = 0.0
     if law.has_toughness:
         energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])

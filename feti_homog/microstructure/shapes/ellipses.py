@@ -250,7 +250,8 @@ class Discs(ConvexCurves):
 
     def support(self, normal: Float) -> Float:
         """Return the radii (k, ...), the supports in all directions."""
-        return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
+        radii = np.expand_dims(self.radii, axis=tuple(range(1, normal.ndim - 1)))
+        return np.broadcast_to(radii, normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
         """Separate pairs along the vectors between centres, or along x for zero vectors; see `ConvexSums.parting`."""

@@ -60,8 +60,9 @@ class ConvexCurves:
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
         """Apply a function, field by field, to this object and other curves."""
-        names = [field.name for field in fields(self)]
-        return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
+        curves = (self, *others)
+        values = [function(*(getattr(each, field.name) for each in curves)) for field in fields(self)]
+        return type(self)(*values)
 
 
 class ColumnRange(NamedTuple):

@@ -63,12 +63,13 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
     parts = [(mask, part) for mask, part in parts if mask.any()]
     if not parts:
         return outlines
-    if all(isinstance(each, Discs) for each in (outlines, *(part for _, part in parts))):
+    before_and_after = [outlines, *(part for _, part in parts)]
+    if all(isinstance(curves, Discs) for curves in before_and_after):
         radii = outlines.radii.copy()
         for mask, part in parts:
             radii[mask] = part.radii
         return Discs(outlines.centres, radii)
-    most = max(part.cores.shape[1] for part in (outlines, *(part for _, part in parts)))
+    most = max(curves.cores.shape[1] for curves in before_and_after)
     frames, cores = outlines.frames.copy(), _padded(outlines.cores, most)
     for mask, part in parts:
         frames[mask], cores[mask] = part.frames, _padded(part.cores, most)

@@ -38,8 +38,10 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
     """Call a function on rank 0, and return the result there, None elsewhere; see `on_root`.  Collective."""
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
+    if error is not None and not isinstance(error, MemoryError):
+        raise error
     if message is not None:
-        raise message if isinstance(error, MemoryError) else error or message
+        raise message
     return result
 
 
@@ -138,9 +140,11 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
 def _comes(request: Request, timeout: float) -> bool:
     """Wait at most `timeout` seconds for a request; return whether it has completed."""
     deadline = time.monotonic() + timeout
-    while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
+    while not request.Test():
+        if time.monotonic() >= deadline:
+            return False
         time.sleep(0.001)
-    return is_fulfilled
+    return True
 
 
 def _lines(error: FetiHomogError) -> str:

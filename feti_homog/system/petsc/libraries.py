@@ -32,7 +32,8 @@ def require() -> None:
             faults.append(f"{error.name} is not found: {advice}")
         except (ImportError, ValueError) as error:
             faults.append(_unfit(name, error, advice))
-    if "h5py" in sys.modules and not (h5py := sys.modules["h5py"]).get_config().mpi:
+    h5py = sys.modules.get("h5py")
+    if h5py is not None and not h5py.get_config().mpi:
         remedy = f"import feti_homog before h5py, or {H5PY}, and remove this one"
         faults.append(f"h5py {h5py.__file__} is built without MPI: {remedy}")
     if faults:

@@ -36,6 +36,7 @@ def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
 
 
 PC_TYPES = "auto|none|lumped|dirichlet|influence"
+COLUMNS_HELP = "changed rows after which a new reference cell is factored; by default none below 2501 rows"
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
@@ -49,12 +50,7 @@ OPTIONS = (
     Option("feti_dual_operator", "auto|implicit|explicit", "auto", "triangular solves (natural coarse space) or dense"),
     Option("feti_coarse_space", "auto|natural|adaptive", "auto", "rigid-body motions only, or soft modes too"),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
-    Option(
-        "feti_influence_columns",
-        "<integer>",
-        "1000",
-        "changed rows after which a new reference cell is factored; by default none below 2501 rows",
-    ),
+    Option("feti_influence_columns", "<integer>", "1000", COLUMNS_HELP),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
     Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace for them, in per cent"),
@@ -79,13 +75,13 @@ PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 
 # Options that PETSc reads when it starts, logs and ends.
 PETSC_NAMES = (
-    *("help", "version", "info", "info_exclude", "tmp", "shared_tmp", "log_view", "log_view_memory"),
-    *("log_view_gpu_time", "log_all", "log_trace", "get_total_flops", "malloc", "malloc_debug", "malloc_dump"),
-    *("malloc_view", "malloc_test", "memory_view", "objects_dump", "checkstack", "options_file", "options_left"),
-    *("options_view", "options_monitor", "options_monitor_cancel", "options_suppress_deprecated_warnings"),
-    *("skip_petscrc", "on_error_abort", "on_error_mpiabort", "error_output_stdout", "error_output_none"),
-    *("no_signal_handler", "fp_trap", "check_pointer_intensity", "mpidump"),
-)
+    "help", "version", "info", "info_exclude", "tmp", "shared_tmp", "log_view", "log_view_memory",
+    "log_view_gpu_time", "log_all", "log_trace", "get_total_flops", "malloc", "malloc_debug", "malloc_dump",
+    "malloc_view", "malloc_test", "memory_view", "objects_dump", "checkstack", "options_file", "options_left",
+    "options_view", "options_monitor", "options_monitor_cancel", "options_suppress_deprecated_warnings",
+    "skip_petscrc", "on_error_abort", "on_error_mpiabort", "error_output_stdout", "error_output_none",
+    "no_signal_handler", "fp_trap", "check_pointer_intensity", "mpidump",
+)  # fmt: skip
 # Beginnings of options with which PETSc waits for a person, runs other code, or reads unchecked files.
 NOT_IN_BATCH = re.compile("history|citations|python|options_.*yaml|start_|stop_|debug|dll|on_error_(att|em)")
 # Beginnings of further options, which differ between releases of PETSc.
@@ -105,16 +101,20 @@ def unknown_options(names: Iterable[str]) -> list[str]:
     for name in names:
         hint = ""
         if name.startswith("feti_"):
-            hint = "" if name in TABLE or solver_prefix(name) else f"unknown option; {suggestion(name)}"
+            if name not in TABLE and not solver_prefix(name):
+                hint = f"unknown option; {suggestion(name)}"
         elif f"feti_{name}" in TABLE:
             hint = f"not an option of this program; did you mean -feti_{name}?"
         elif NOT_IN_BATCH.match(name):
             hint = "no option of a program that runs in batch"
-        elif name not in PETSC_NAMES and (nearest := difflib.get_close_matches(name, PETSC_NAMES, 1, 7 / 8)):
-            hint = f"unknown option; did you mean -{nearest[0]}?"
-        elif name not in PETSC_NAMES and not name.startswith(PETSC_BEGINNINGS):
-            hint = "unknown option; solvers of this program have options that begin with -feti_"
-        faults += [f"-{name}: {hint}"] if hint else []
+        elif name not in PETSC_NAMES:
+            nearest = difflib.get_close_matches(name, PETSC_NAMES, 1, 7 / 8)
+            if nearest:
+                hint = f"unknown option; did you mean -{nearest[0]}?"
+            elif not name.startswith(PETSC_BEGINNINGS):
+                hint = "unknown option; solvers of this program have options that begin with -feti_"
+        if hint:
+            faults.append(f"-{name}: {hint}")
     return faults
 
 

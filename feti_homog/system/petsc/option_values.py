@@ -16,10 +16,10 @@ OptionRule = tuple[str, Callable[[str], bool]]
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
 FLAGS = (
-    *("feti_view", "malloc", "malloc_debug", "malloc_dump", "malloc_test", "malloc_requested_size", "checkstack"),
-    *("log_all", "log_sync", "log_view_memory", "log_view_gpu_time", "get_total_flops", "options_monitor_cancel"),
-    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
-)
+    "feti_view", "malloc", "malloc_debug", "malloc_dump", "malloc_test", "malloc_requested_size", "checkstack",
+    "log_all", "log_sync", "log_view_memory", "log_view_gpu_time", "get_total_flops", "options_monitor_cancel",
+    "options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler",
+)  # fmt: skip
 CASE_FILE = ".toml"
 
 
@@ -47,13 +47,14 @@ def can_be_written(file: str) -> bool:
 
 def faulty_values(options: Mapping[str, Value]) -> list[str]:
     """Return one fault for every option (name without dash) with an invalid value."""
-    texts = {name: _text(value) for name, value in options.items()}
-    return sorted(
-        f"{in_words(name, text)}: expected {rule[0]}"
-        + "; there is no such file" * (name == "options_file" and not os.path.exists(text))
-        for name, text in texts.items()
-        if (rule := PRINTS if is_viewer(name) else RULES.get(name)) and not rule[1](text)
-    )
+    faults = []
+    for name, value in options.items():
+        text = _text(value)
+        rule = PRINTS if is_viewer(name) else RULES.get(name)
+        if rule is not None and not rule[1](text):
+            hint = "; there is no such file" if name == "options_file" and not os.path.exists(text) else ""
+            faults.append(f"{in_words(name, text)}: expected {rule[0]}{hint}")
+    return sorted(faults)
 
 
 def in_words(name: str, value: str) -> str:
@@ -64,7 +65,9 @@ def in_words(name: str, value: str) -> str:
 def flag_value(value: Value) -> str | None:
     """Return PETSc's value of a flag: empty for true, None for false, else the text (a viewer)."""
     text = _text(value)
-    return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
+    if text.lower() in FALSE:
+        return None
+    return "" if text.lower() in TRUE else text
 
 
 def is_flag(name: str) -> bool:
@@ -152,7 +155,7 @@ RULES: dict[str, OptionRule] = {
     "fp_trap": ("false: the program checks where numbers may not be finite", _is_false),
     **dict.fromkeys(
         ("info", "malloc_view"),  # up to its first colon the text is a switch or a file
-        (NEW_FILE, lambda text: _is_switch(file := text.partition(":")[0]) or can_be_written(file)),
+        (NEW_FILE, lambda text: _is_switch(text.partition(":")[0]) or can_be_written(text.partition(":")[0])),
     ),
     "options_file": ("a file with one option of PETSc a line, without options_file", lambda text: False),
     "log_trace": (NEW_FILE, lambda text: not text or can_be_written(text)),
@@ -176,7 +179,8 @@ def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
             # A case file is never a value, and a path is never the value of a flag.
             is_path = not is_flag_value and (os.sep in word or os.path.exists(word))
             is_ours = re.match("--|-h$", word) or (word.endswith(CASE_FILE) and name != "options_file")
-            (petsc if name and not is_ours and not (is_flag(name) and is_path) else ours).append(word)
+            is_value = name and not is_ours and not (is_flag(name) and is_path)
+            (petsc if is_value else ours).append(word)
             name = ""
     return ours, petsc
 
@@ -205,9 +209,12 @@ def petsc_words(options: Mapping[str, str]) -> list[str]:
 
     Flags that PETSc reads itself are set or left out.  False flags of the solver stay: they override the case.
     """
-    texts = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
-    pairs = [(f"-{name}", text) for name, text in texts.items() if text is not None]
-    return [word for pair in pairs for word in pair if word]
+    argv = []
+    for name, text in options.items():
+        value = flag_value(text) if is_own_flag(name) else text
+        if value is not None:
+            argv += [f"-{name}", value] if value else [f"-{name}"]
+    return argv
 
 
 def _is_petsc(word: str) -> bool:

@@ -98,11 +98,10 @@ NO_SUCH_METHOD = "requested KSP type"
 class _Identity:
     """The identity as a 1 x 1 shell matrix and shell preconditioner, in place of the dual problem."""
 
-    def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def mult(self, shell: PETSc.Object, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)
 
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        x.copy(y)
+    apply = mult
 
 
 def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
@@ -112,7 +111,9 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     solver) is made for a 1 x 1 matrix and applied once, because some methods fail only then.  PETSc marks the options
     that it reads, and prints all readable options with -help.  Options that print are removed meanwhile.
     """
-    faults, viewers, database, comm = [], [*filter(values.is_viewer, options)], PETSc.Options(), PETSc.COMM_SELF
+    faults = []
+    viewers = [name for name in options if values.is_viewer(name)]
+    database, comm = PETSc.Options(), PETSc.COMM_SELF
     try:
         for name in viewers:
             database.delValue(name)

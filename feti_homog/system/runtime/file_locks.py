@@ -76,7 +76,8 @@ class Lock:
         self.release()
 
     def _take(self) -> None:
-        deadline, kind = time.monotonic() + self.timeout, fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
+        deadline = time.monotonic() + self.timeout
+        kind = fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
             while not _is_taken(self._file, kind):
@@ -87,10 +88,11 @@ class Lock:
                 with contextlib.suppress(OSError):  # on a full disk the lock holds without the name of its holder
                     os.truncate(self._file, 0)
                     os.pwrite(self._file, this_process().encode(), 0)
-        except (OSError, LockHeld) as error:
+        except LockHeld:
             self._close()
-            if isinstance(error, LockHeld):
-                raise
+            raise
+        except OSError as error:
+            self._close()
             failure = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
             raise failure(f"cannot lock {self.path}: {error.strerror}") from error
 

@@ -56,8 +56,10 @@ def read(path: Path, most: int = MOST_BYTES, pipes: bool = False) -> bytes:
 def unreadable(path: Path, error: OSError) -> FetiHomogError:
     """Return the exception for an unreadable file: CaseError, or FetiHomogError if permission is missing."""
     kind = FetiHomogError if isinstance(error, PermissionError) else CaseError
-    is_open = "it is open in this program: close it, or open it with h5py.File(path, locking=False)"
-    return kind(f"cannot read {path}: {is_open if 'file locking flag' in str(error) else error.strerror or error}")
+    fault = error.strerror or str(error)
+    if "file locking flag" in str(error):
+        fault = "it is open in this program: close it, or open it with h5py.File(path, locking=False)"
+    return kind(f"cannot read {path}: {fault}")
 
 
 def in_own_process(path: Path, function: Callable[[Path], T], memory: int, seconds: float | None = None) -> T:
@@ -84,8 +86,8 @@ def in_own_process(path: Path, function: Callable[[Path], T], memory: int, secon
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: the child ends with its parent
         addresses = int(STATM.read_text().split()[0]) * resource.getpagesize() + memory
         for kind, limit in ((resource.RLIMIT_CPU, math.ceil(seconds)), (resource.RLIMIT_AS, addresses)):
-            limits = resource.getrlimit(kind)
-            resource.setrlimit(kind, (min({limit, *limits} - {resource.RLIM_INFINITY}), limits[1]))
+            soft, hard = resource.getrlimit(kind)
+            resource.setrlimit(kind, (min({limit, soft, hard} - {resource.RLIM_INFINITY}), hard))
         try:
             sender.send(function(path))
         except FetiHomogError as error:

@@ -44,11 +44,12 @@ def require_limits() -> None:
         FetiHomogError: a limit is below STACK or ADDRESSES; one line for every limit.
     """
     limits = ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES)
-    faults = [
-        f"the {name} of the process is limited to {limit >> 10} KiB; expected at least {needed >> 10} KiB"
-        for name, kind, needed in limits
-        if (limit := resource.getrlimit(kind)[0]) != resource.RLIM_INFINITY and limit < needed
-    ]
+    faults = []
+    for name, kind, needed in limits:
+        limit = resource.getrlimit(kind)[0]
+        if limit != resource.RLIM_INFINITY and limit < needed:
+            expected = f"expected at least {needed >> 10} KiB"
+            faults.append(f"the {name} of the process is limited to {limit >> 10} KiB; {expected}")
     if faults:
         raise FetiHomogError(*faults)
 

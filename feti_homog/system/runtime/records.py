@@ -116,8 +116,8 @@ def _restored_value(hint: Any, value: Any) -> Any:
         return tuple(_restored_value(typing.get_args(hint)[0], item) for item in value)
     if origin in KINDS:
         _require(value, KINDS[origin])
-    if origin is Mapping and (inner := typing.get_args(hint)[1]) in KINDS:
-        return {name: _restored_value(inner, item) for name, item in value.items()}
+    if origin is Mapping and typing.get_args(hint)[1] in KINDS:
+        return {name: _restored_value(typing.get_args(hint)[1], item) for name, item in value.items()}
     return value
 
 

@@ -71,7 +71,7 @@ def prepare() -> None:
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if getattr(stream, "closed", stream is None):  # None if it was closed before Python began
+        if stream is None or getattr(stream, "closed", False):  # None if it was closed before Python began
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
