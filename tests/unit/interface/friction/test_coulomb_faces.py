@@ -168,7 +168,7 @@ def test_paths_of_much_friction_end_where_no_statuses_go_on():
         except StuckError as error:
             status, x, by_stress, rate = asked[-1]
             search = StatusSearch(
-                faces, faces._at_limits(status, x), Prescribed(by_stress, rate, 0.0 * status), 0.0 * x
+                faces, faces._at_limits(status, x, faces.noise(x)), Prescribed(by_stress, rate, 0.0 * status), 0.0 * x
             )
             several = [STATUSES[own] for own in search.allowed]
             trials = [np.array(own, np.int8) for own in product(*several)]
