@@ -189,11 +189,11 @@ class AnalysisContext:
         return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening(self)}", room)
 
     @cached_property
-    def release_rates(self) -> energy_release.EnergyReleaseRates:
-        """Return the energy release rates at the tips of debonded arcs.  Collective when first read."""
+    def release_rates(self) -> list[energy_release.EnergyReleaseRates]:
+        """Return the energy release rates at tips of arcs, one for each problem.  Collective when first read."""
         from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
-        return energy_release.EnergyReleaseRates(self.cell, self.plane.interface)
+        return [energy_release.EnergyReleaseRates(problem.cell, problem.interface) for problem in self.loads.problems]
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:

@@ -21,20 +21,20 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     errors_of_minus = errors[:0]
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, loads, first = list(responses), list(context.loads.names), responses
+    under, first = dict(zip(context.loads.names, responses, strict=True)), responses
     if one_sided:
         minus, responses = context.unit_responses("", bonds, starts, -1.0)
         errors_of_minus, responses = response_errors(context, context.loads.by_problem(responses))
         context.record_unit_states(responses, -1.0, "-", 0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
-        under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in loads)]
+        under |= {f"-{name}": response for name, response in zip(context.loads.names, responses, strict=True)}
     else:
         context.checks.require("L^ef", {"symmetry": averaging.asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
         from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
 
-        document["tips"] = tip_rates(context, under, loads)
+        document["tips"] = tip_rates(context, {load: [response] for load, response in under.items()})
     document |= constants(context.cell, document)
     if context.case.output.sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs need sensitivities

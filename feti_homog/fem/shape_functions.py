@@ -177,48 +177,46 @@ class MixedElements:
         return np.asarray(K.reshape(e, -1, 2 * a) + first * projected @ flat)
 
 
-@dataclass(frozen=True)
-class PointFields:
-    """The fields in e elements at q quadrature points, with components in the order [11, 22, 12].
+def point_fields(
+    points: Float, u: Float, A: Float, uniform: Float, is_mixed: bool
+) -> tuple[Float, Float, Float, Float, Float]:
+    """Compute the fields in e elements at q quadrature points, from nodes `points` (e, a, 2) and u (e, a, c).
 
-    Attributes:
-        gradients, weights: gradients (e, q, a, 2) of the shape functions, a bubble last, and weights (e, q).
-        u: (e, a, 2) displacements, in mixed elements also of the bubble.
-        strain, stress: (e, q, 3) strains and stresses.
-        density: (e, q) strain energy density: sigma : eps / 2, plus p (div u - p / lambda) / 2 in mixed elements.
+    The loads e are the m strains of u, [11, 22, 12] or [13, 23], and the v - m `uniform` loads, with the stiffness A
+    (v, v).  Return the gradients (e, q, a, 2) of the shape functions, in mixed elements a bubble last, the weights
+    (e, q), u with the bubble, the stresses (e, q, m), and the energy density (e, q): e.A e / 2, plus
+    p (div u - p / lambda) / 2 in mixed elements.
     """
-
-    gradients: Float
-    weights: Float
-    u: Float
-    strain: Float
-    stress: Float
-    density: Float
-
-
-def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute the fields in elements, mixed if `is_mixed`, from nodes `points` and u (e, a, 2), and L (3, 3)."""
-    if not is_mixed:
+    m, correction = len(A) - len(uniform), 0.0
+    if is_mixed:
+        elements = MixedElements.of(points, A)
+        g, weights, inner = elements.gradients, elements.weights, elements.with_bubble(u[..., None])
+        u, strain, stress, mean = (
+            field[..., 0]
+            for field in (inner, elements.strain(inner), elements.stress(inner), elements.dilatation(inner))
+        )
+        correction = elements.lame[0] * mean * (strain[..., 0] + strain[..., 1] - mean)
+    else:
         g, weights = gradients(points)
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
-        stress = strain @ L
-        return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
-    elements = MixedElements.of(points, L)
-    inner = elements.with_bubble(u[..., None])
-    strain, stress, mean = (field(inner)[..., 0] for field in (elements.strain, elements.stress, elements.dilatation))
-    off = strain[..., 0] + strain[..., 1] - mean
-    density = ((stress * strain).sum(axis=2) + elements.lame[0] * mean * off) / 2
-    return PointFields(elements.gradients, elements.weights, inner[..., 0], strain, stress, density)
+        stress = strain @ A[:m, :m]
+    imposed = uniform @ A[m:]
+    density = ((stress * strain).sum(axis=2) + correction + imposed[m:] @ uniform) / 2 + strain @ imposed[:m]
+    return g, weights, u, stress + imposed[:m], density
 
 
 def voigt(gradient: Float) -> Float:
-    """Return the strains [11, 22, 12] (e, q, 3, ..) of displacement gradients (e, q, 2, 2, ..)."""
+    """Return the strains [11, 22, 12] or [13, 23] (e, q, m, ..) of displacement gradients (e, q, c, 2, ..)."""
+    if gradient.shape[2] == 1:
+        return gradient[:, :, 0]
     shear = gradient[:, :, 0, 1] + gradient[:, :, 1, 0]
     return np.stack([gradient[:, :, 0, 0], gradient[:, :, 1, 1], shear], axis=2)
 
 
-def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
-    """Compute the energy rate of elements whose nodes and displacements change.
+def energy_change(
+    points: Float, u: Float, A: Float, uniform: Float, moved: Float, changed: Float, is_mixed: bool = False
+) -> float:
+    """Compute the energy rate of elements whose nodes and displacements change under constant `uniform` loads.
 
     With nodes at x + s dx, displacements u + s du and energy density W, the rate d/ds sum_e int W at s = 0 is
 
@@ -228,13 +226,12 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
     elements stay constant, because the energy is stationary in both.
 
     Args:
-        points, u: (e, a, 2) element nodes and their displacements.
-        L, is_mixed: (3, 3) stiffness, and whether the elements have a bubble and a pressure.
-        moved, changed: (e, a, 2) dx and du.
+        points, u: (e, a, 2) element nodes and their displacements (e, a, c).
+        A, uniform, is_mixed: arguments of `point_fields`.
+        moved, changed: (e, a, 2) dx and (e, a, c) du.
     """
-    fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
-    grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)
-    of_nodes = fields.gradients[:, :, :nodes]
+    g, weights, u, stress, density = point_fields(points, u, A, uniform, is_mixed)
+    grad_u, of_nodes = np.einsum("eai,eqad->eqid", u, g), g[:, :, : points.shape[1]]
     grad_moved, grad_changed = (np.einsum("eai,eqad->eqid", field, of_nodes) for field in (moved, changed))
-    change = (fields.stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
-    return float((fields.weights * (change + fields.density * np.trace(grad_moved, axis1=2, axis2=3))).sum())
+    change = (stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
+    return float((weights * (change + density * np.trace(grad_moved, axis1=2, axis2=3))).sum())

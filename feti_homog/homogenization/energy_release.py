@@ -7,8 +7,9 @@ gaps stay constant.  This is an admissible variation, and G follows from the cha
 
 G is split into modes in proportion to the work in opening and in shear that closes the last part of the crack (virtual
 crack closure).  The split depends on the length of this part, for the stress oscillates at a tip between two materials.
+Displacements along the fibres do not turn: their virtual crack extension gives G_III alone.
 
-For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) is the spring energy at the tip.
+For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) + t_a^2 / (2 k_a) is the spring energy at the tip.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,6 @@ from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.contact import BONDED, ContactProblem, Status
-from feti_homog.materials import voigt
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int
 
@@ -51,14 +51,14 @@ class CrackExtension:
         entries = np.ones(len(elements), np.int8), (mesh.triangles.ravel(), elements)
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
-    def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
+    def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, load: Float) -> float:
         """Return the derivative of the subdomain energy with respect to the angle by which a crack tip turns.
 
         Args:
             tip, spoke: (2,) position of the tip, and position relative to the circle centre.
             reach: distance beyond which no node turns; without a node within it, the derivative is 0.
             u: (dofs,) displacements u*.
-            E: (2, 2) macroscopic strain.
+            load: loads of the problem, the strains first.
         """
         inside = self._tree.query_ball_point(in_cell(tip, self._period), reach)
         if not inside:
@@ -71,10 +71,12 @@ class CrackExtension:
         nearest = np.argmin((offset**2).sum(axis=2), axis=1)[:, None, None]
         offset = points + np.take_along_axis(offset - points, nearest, axis=1)
         fraction = np.clip((reach - np.linalg.norm(offset, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
-        total = u.reshape(-1, 2)[mesh.node_class[nodes]] + offset @ E
-        moved, changed = fraction * ((offset + spoke) @ QUARTER_TURN.T), fraction * (total @ QUARTER_TURN.T)
-        s = self.subdomain
-        return shape_functions.energy_change(points, total, s.L[:3, :3], moved, changed, s.is_mixed)
+        s, problem = self.subdomain, self.subdomain.problem
+        strain, uniform = np.split(load[: len(s.L)], [problem.strains])
+        total = u.reshape(-1, problem.components)[mesh.node_class[nodes]] + offset @ problem.gradient(strain).T
+        moved = fraction * ((offset + spoke) @ QUARTER_TURN.T)
+        changed = fraction * (total @ QUARTER_TURN.T if problem.turns else 0.0 * total)
+        return shape_functions.energy_change(points, total, s.L, uniform, moved, changed, s.is_mixed)
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class EnergyRelease:
         fibre: (t,) numbers from 1.
         pair: (t,) interface sections.
         direction: (t,) degrees in (-180, 180] about the fibre centre.
-        modes: (t, 2) G_I and G_II.
+        modes: (t, 3) G_I, G_II and G_III.
         length: (t,) closed length that determines the modes of rigid bonds.
     """
 
@@ -102,13 +104,13 @@ class EnergyRelease:
 
     @property
     def mode_angle(self) -> Float:
-        """The mode angle psi (t,) in degrees, tan^2 psi = G_II / G_I; 0 is opening, 90 shear."""
-        roots = np.sqrt(np.maximum(self.modes, 0.0))
-        return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
+        """The mode angle psi (t,) in degrees, tan^2 psi = (G_II + G_III) / G_I; 0 is opening, 90 shear."""
+        opening, shear = self.modes[:, 0], self.modes[:, 1:].sum(axis=1)
+        return np.asarray(np.degrees(np.arctan2(np.sqrt(shear), np.sqrt(opening))))
 
 
 class EnergyReleaseRates:
-    """The energy release rates in a torn cell, response by response.
+    """The energy release rates in one problem of a torn cell, response by response.
 
     Attributes:
         cell, interface: torn cell, and contact problem of the responses.
@@ -129,8 +131,8 @@ class EnergyReleaseRates:
         # Rounding errors must not decide the order of directions.
         direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
-        # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
-        self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
+        # (interfaces, c) stiffnesses of the bonds, infinite where they are rigid.
+        self._stiffness = np.array(phase_laws.springs(cell.case, cell.solver.problem).stiffness)
         self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
         # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, -1 at voids. Each body has its own nodes
         # where two bodies meet; cuts between a body's pieces are not boundaries.
@@ -151,7 +153,7 @@ class EnergyReleaseRates:
     def of(self, response: Response) -> EnergyRelease:
         """Return the energy release rates at all tips on circular interfaces of a response.  Collective."""
         solution, status = response.state.solution, self._gathered(response.state.status)
-        tips = self._chains.tips(status)
+        tips, in_plane = self._chains.tips(status), self.cell.solver.problem.turns
         # Tips on circles, in the order of fibres, interfaces and directions.
         order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self.fibre[tips.node]))
         tips = tips.chosen(order[np.isfinite(self.radius[tips.node[order]])])
@@ -163,19 +165,16 @@ class EnergyReleaseRates:
         stiffness = self._stiffness[self.pair[tips.node]]
         is_rigid = np.isinf(stiffness)
         traction = force[tips.node] / self.length[tips.node, None]
-        traction[:, 0] = np.maximum(traction[:, 0], 0.0)  # pressed faces do not part
-        modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
+        if in_plane:
+            traction[:, 0] = np.maximum(traction[:, 0], 0.0)  # pressed faces do not part
+        modes, rates = np.zeros((len(tips.node), 3)), np.where(is_rigid, closing, traction**2 / (2 * stiffness))
         rigid = np.flatnonzero(is_rigid.all(axis=1))
         work = closing[rigid].sum(axis=1, keepdims=True)
         fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
-        modes[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
-        return EnergyRelease(
-            fibre=self.fibre[tips.node],
-            pair=self.pair[tips.node],
-            direction=self.direction[tips.node],
-            modes=response.scale**2 * modes,
-            length=length,
-        )
+        rates[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
+        modes[:, slice(2) if in_plane else slice(2, 3)] = response.scale**2 * rates
+        fibre, pair, direction = self.fibre[tips.node], self.pair[tips.node], self.direction[tips.node]
+        return EnergyRelease(fibre=fibre, pair=pair, direction=direction, modes=modes, length=length)
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
         """Return G (t,) by a virtual crack extension at each tip, for the state before scaling.  Collective."""
@@ -186,34 +185,31 @@ class EnergyReleaseRates:
         # Within `reach` of a tip there is no other tip, and no boundary except the circle of the tip.
         radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self._period
         reach, wrapped = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(position, period)
-        if len(position) > 1:
-            nearest, _ = cKDTree(wrapped, boxsize=period).query(wrapped, 2)
-            reach = np.minimum(reach, nearest[:, 1])
+        nearest, _ = cKDTree(wrapped, boxsize=period).query(wrapped, 2)  # infinite for a single tip
+        reach = np.minimum(reach, nearest[:, 1])
         inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(wrapped, reach)
         for t, nodes in enumerate(inside):
             offset = nearest_image(points[nodes] - position[t], period)
             off_circle = np.abs(np.linalg.norm(offset + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
             limits = off_circle | ~np.isin(body[nodes], bodies[t])
             reach[t] = REACH * min(reach[t], np.linalg.norm(offset[limits], axis=1).min(initial=np.inf))
-        u, E = self.cell.solver.displacement(solution), voigt.strain_tensor(solution.strain[:3])
-        change, first = np.zeros(len(bodies)), 0
-        for extension in self._extensions:
-            last = first + extension.subdomain.n_dofs
+        u = self.cell.solver.displacement(solution)
+        ends, change = np.cumsum([s.n_dofs for s in self.cell.subdomains]), np.zeros(len(bodies))
+        for extension, of_body in zip(self._extensions, np.split(u, ends[:-1]), strict=False):
             for t in np.flatnonzero((bodies == extension.subdomain.submesh.body).any(axis=1)):
-                change[t] += extension.energy_change(position[t], spokes[t], reach[t], u[first:last], E)
-            first = last
+                change[t] += extension.energy_change(position[t], spokes[t], reach[t], of_body, solution.strain)
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
         return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """Return the work that closes each crack, from forces and jumps (n, 2), and the closed lengths (t,).
+        """Return the work that closes each crack, from forces and jumps (n, c), and the closed lengths (t,).
 
-        The work is `closing_work` (t, 2) in opening and in shear.  A closed length is the larger of MODE_LENGTH times
-        the radius and the length of the element behind the tip.
+        The work is `closing_work` (t, c).  A closed length is the larger of MODE_LENGTH times the radius and the length
+        of the element behind the tip.
         """
         least, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
-        work, length = np.zeros((len(least), 2)), np.zeros(len(least))
+        work, length = np.zeros((len(least), jump.shape[1])), np.zeros(len(least))
         # The largest number of chain nodes within these lengths, plus one element.
         counts = self._tree.query_ball_point(in_cell(self.points[tips.node], self._period), least, return_length=True)
         steps = order + int(counts.max(initial=1))
