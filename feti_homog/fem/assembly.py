@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.fem.shape_functions import HESSIANS, MixedElements, affine_couples, gradients
+from feti_homog.fem.shape_functions import HESSIANS, MixedElements, affine_couples, gradients, slopes, strains
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
@@ -103,13 +103,12 @@ def element_strain(
 ) -> tuple[Float, Float]:
     """Compute the mean element strains (e, m) under displacements u (classes, c), and the element areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
-    parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
         g, w = gradients(points[triangles[part]])
         area[part] = w.sum(axis=1)
         mean = np.einsum("eqad,eq->ead", g, w) / area[part, None, None]
-        gradient = np.einsum("eai,ead->eid", u[node_class[triangles[part]]], mean)
-        strain[part] = np.stack([gradient[:, i, d].sum(axis=1) for i, d in parts_of], axis=1)
+        gradient = slopes(mean[:, None], u[node_class[triangles[part]]][..., None])
+        strain[part] = strains(gradient, problem)[:, 0, :, 0]
     return strain, area
 
 

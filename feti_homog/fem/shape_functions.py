@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.typing import Float
 
 # The 6-point rule for quadratic triangles is exact to degree 4 (Dunavant 1985): it integrates the stiffness and the
@@ -140,12 +141,6 @@ class MixedElements:
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
 
-    def strain(self, u: Float) -> Float:
-        """Compute strains (e, q, 3, k) under displacements (e, 7, 2, k)."""
-        e, q, a, _ = self.gradients.shape
-        slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
-        return voigt(slope.reshape(e, q, 2, 2, -1))
-
     def dilatation(self, u: Float) -> Float:
         """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
@@ -154,7 +149,7 @@ class MixedElements:
     def stress(self, u: Float) -> Float:
         """Compute stresses 2 mu eps + p I, (e, q, 3, k), under displacements (e, 7, 2, k)."""
         first, shear = self.lame
-        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
+        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * strains(slopes(self.gradients, u), PLANE)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
@@ -177,61 +172,74 @@ class MixedElements:
         return np.asarray(K.reshape(e, -1, 2 * a) + first * projected @ flat)
 
 
-def point_fields(
-    points: Float, u: Float, A: Float, uniform: Float, is_mixed: bool
-) -> tuple[Float, Float, Float, Float, Float]:
-    """Compute the fields in e elements at q quadrature points, from nodes `points` (e, a, 2) and u (e, a, c).
+@dataclass(frozen=True)
+class ElementFields:
+    """The fields in e elements at q points under k loads.
 
-    The loads e are the m strains of u, [11, 22, 12] or [13, 23], and the v - m `uniform` loads, with the stiffness A
-    (v, v).  Return the gradients (e, q, a, 2) of the shape functions, in mixed elements a bubble last, the weights
-    (e, q), u with the bubble, the stresses (e, q, m), and the energy density (e, q): e.A e / 2, plus
-    p (div u - p / lambda) / 2 in mixed elements.
+    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
+    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
+
+    Attributes:
+        problem: the c displacements, and their m strains.
+        gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
+        slopes: (e, q, 2, c, k) du_i / dx_d.
+        strain: (e, q, m, k) with the loads.
+        rest: (e, q, k) r; None unless the elements are mixed.
     """
-    m, correction = len(A) - len(uniform), 0.0
-    if is_mixed:
-        elements = MixedElements.of(points, A)
-        g, weights, inner = elements.gradients, elements.weights, elements.with_bubble(u[..., None])
-        u, strain, stress, mean = (
-            field[..., 0]
-            for field in (inner, elements.strain(inner), elements.stress(inner), elements.dilatation(inner))
-        )
-        correction = elements.lame[0] * mean * (strain[..., 0] + strain[..., 1] - mean)
-    else:
-        g, weights = gradients(points)
-        strain = voigt(np.einsum("eai,eqad->eqid", u, g))
-        stress = strain @ A[:m, :m]
-    imposed = uniform @ A[m:]
-    density = ((stress * strain).sum(axis=2) + correction + imposed[m:] @ uniform) / 2 + strain @ imposed[:m]
-    return g, weights, u, stress + imposed[:m], density
+
+    problem: Problem
+    gradients: Float
+    weights: Float
+    slopes: Float
+    strain: Float
+    rest: Float | None
+
+    @classmethod
+    def of(cls, problem: Problem, points: Float, u: Float, A: Float, loads: Float, is_mixed: bool) -> ElementFields:
+        """Compute the fields from nodes (e, a, 2), displacements u (e, a, c, k), laws A (v, v) and strains (m, k)."""
+        if not is_mixed:
+            g, w = gradients(points)
+            grad_u = slopes(g, u)
+            return cls(problem, g, w, grad_u, strains(grad_u, problem) + loads, None)
+        elements, inner = MixedElements.of(points, A), u.shape[1]
+        u = elements.with_bubble(u)
+        grad_u, g = slopes(elements.gradients, u), elements.gradients[:, :, :inner]
+        rest = np.trace(grad_u, axis1=2, axis2=3) - elements.dilatation(u)
+        return cls(problem, g, elements.weights, grad_u, strains(grad_u, problem) + loads, rest)
+
+    def change(self, A: Float, uniform: Float, moved: Float, changed: Float | None = None) -> Float:
+        """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V, and u at the nodes by s U.
+
+        The derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with d grad u = grad U - grad V grad u,
+        exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183).  A is (v, v), `uniform` (v - m, k)
+        has the loads after the m strains, `moved` is V (e, a, 2), and `changed` is U (e, a, c, k), by default 0.
+        """
+        grad_V = slopes(self.gradients, moved[..., None])[..., 0]
+        div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
+        grad_u = (-grad_V @ self.slopes.reshape(*grad_V.shape[:3], -1)).reshape(self.slopes.shape)
+        grad_u += 0.0 if changed is None else slopes(self.gradients, changed)
+        change = strains(grad_u, self.problem)
+        loads = np.broadcast_to(uniform, (*self.weights.shape, *uniform.shape))
+        strain = np.concatenate([self.strain, loads], axis=2)
+        work = self.weights[..., None, None] * (A @ strain)
+        half = div_V / 2 * strain
+        half[:, :, : self.problem.strains] += change
+        rate = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
+        if self.rest is not None:
+            half = change[:, :, 0] + change[:, :, 1] + div_V[..., 0] / 2 * self.rest
+            rate -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
+        return np.asarray(rate + rate.T)
 
 
-def voigt(gradient: Float) -> Float:
-    """Return the strains [11, 22, 12] or [13, 23] (e, q, m, ..) of displacement gradients (e, q, c, 2, ..)."""
-    if gradient.shape[2] == 1:
-        return gradient[:, :, 0]
-    shear = gradient[:, :, 0, 1] + gradient[:, :, 1, 0]
-    return np.stack([gradient[:, :, 0, 0], gradient[:, :, 1, 1], shear], axis=2)
+def slopes(g: Float, u: Float) -> Float:
+    """Return the slopes du_i / dx_d (e, q, 2, c, k) from gradients (e, q, a, 2) and displacements (e, a, c, k)."""
+    e, q, a, _ = g.shape
+    return np.asarray((g.transpose(0, 1, 3, 2).reshape(e, -1, a) @ u.reshape(e, a, -1)).reshape(e, q, 2, *u.shape[2:]))
 
 
-def energy_change(
-    points: Float, u: Float, A: Float, uniform: Float, moved: Float, changed: Float, is_mixed: bool = False
-) -> float:
-    """Compute the energy rate of elements whose nodes and displacements change under constant `uniform` loads.
-
-    With nodes at x + s dx, displacements u + s du and energy density W, the rate d/ds sum_e int W at s = 0 is
-
-        int sigma : (grad du - grad u grad dx) + W div dx,
-
-    exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): the bubble and the pressure of mixed
-    elements stay constant, because the energy is stationary in both.
-
-    Args:
-        points, u: (e, a, 2) element nodes and their displacements (e, a, c).
-        A, uniform, is_mixed: arguments of `point_fields`.
-        moved, changed: (e, a, 2) dx and (e, a, c) du.
-    """
-    g, weights, u, stress, density = point_fields(points, u, A, uniform, is_mixed)
-    grad_u, of_nodes = np.einsum("eai,eqad->eqid", u, g), g[:, :, : points.shape[1]]
-    grad_moved, grad_changed = (np.einsum("eai,eqad->eqid", field, of_nodes) for field in (moved, changed))
-    change = (stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
-    return float((weights * (change + density * np.trace(grad_moved, axis1=2, axis2=3))).sum())
+def strains(slope: Float, problem: Problem) -> Float:
+    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
+    strain = np.zeros((*slope.shape[:2], problem.strains, slope.shape[4]))
+    for (i, d), number in np.ndenumerate(problem.voigt):
+        strain[:, :, number] += slope[:, :, d, i]
+    return strain

@@ -16,7 +16,7 @@ import numpy as np
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
-from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions
+from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions, slopes, strains
 from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
@@ -119,12 +119,7 @@ class RecoveredStress:
             stress, weights = elements.stress(elements.with_bubble(u)), elements.weights
         else:
             g, weights = gradients(corners)
-            (e, a, c, k), q = u.shape, g.shape[1]
-            flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
-            gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
-            for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
-                strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
-            stress = self.L[:m, :m] @ strain
+            stress = self.L[:m, :m] @ strains(slopes(g, u), self.problem)
         points = shape_functions(6, barycentric(6)) @ corners
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 

@@ -1,15 +1,14 @@
 """Compute the energy release rate G = -d(energy) / d(debonded length) at tips, at constant strain.
 
-For rigid bonds G follows from a virtual crack extension, with an error like the energy error on any mesh.  The nodes
-around the tip, and the displacements of these nodes, turn about the fibre centre by an angle s q; q is 1 near the tip
-and falls to 0 farther away.  The tip moves along the interface by s R (R: fibre radius), bonded nodes stay bonded, and
-gaps stay constant.  This is an admissible variation, and G follows from the change of the element energies.
+G follows from a virtual crack extension, with an error like the energy error on any mesh.  The nodes around the tip,
+and their displacements, turn about the fibre centre by an angle s q; q is 1 near the tip and falls to 0 farther away.
+The tip moves along the interface by s R (R: fibre radius), bonded nodes stay bonded, and gaps stay constant.
+This is an admissible variation, and G follows from the change of the energies of elements and elastic bonds.
 
-G is split into modes in proportion to the work in opening and in shear that closes the last part of the crack (virtual
-crack closure).  The split depends on the length of this part, for the stress oscillates at a tip between two materials.
-Displacements along the fibres do not turn: their virtual crack extension gives G_III alone.
-
-For elastic bonds G = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) + t_a^2 / (2 k_a) is the spring energy at the tip.
+For rigid bonds G is split into modes in proportion to the work in opening and in shear that closes the last part of the
+crack (virtual crack closure).  The split depends on the length of this part, for the stress oscillates at a tip between
+two materials.  For elastic bonds the modes are the shares of <t_n>^2 / (2 k_n) and t_t^2 / (2 k_t) in the spring energy
+at the tip, which is G on fine meshes.  Displacements along the fibres do not turn: their extension gives G_III alone.
 """
 
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from scipy.spatial import cKDTree
 
 from feti_homog.fem import assembly, shape_functions
 from feti_homog.feti.decomposition import Subdomain
-from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import in_cell
 from feti_homog.homogenization.unit_cell import TornCell
@@ -70,13 +68,14 @@ class CrackExtension:
         # All nodes of an element take the image of the element's node that is nearest to the tip.
         nearest = np.argmin((offset**2).sum(axis=2), axis=1)[:, None, None]
         offset = points + np.take_along_axis(offset - points, nearest, axis=1)
-        fraction = np.clip((reach - np.linalg.norm(offset, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
+        fraction = turning_fraction(offset, reach)[..., None]
         s, problem = self.subdomain, self.subdomain.problem
         strain, uniform = np.split(load[: len(s.L)], [problem.strains])
         total = u.reshape(-1, problem.components)[mesh.node_class[nodes]] + offset @ problem.gradient(strain).T
         moved = fraction * ((offset + spoke) @ QUARTER_TURN.T)
         changed = fraction * (total @ QUARTER_TURN.T if problem.turns else 0.0 * total)
-        return shape_functions.energy_change(points, total, s.L, uniform, moved, changed, s.is_mixed)
+        fields = shape_functions.ElementFields.of(problem, points, total[..., None], s.L, np.zeros(1), s.is_mixed)
+        return float(fields.change(s.L, uniform[:, None], moved, changed[..., None]).sum()) / 2
 
 
 @dataclass(frozen=True)
@@ -131,8 +130,6 @@ class EnergyReleaseRates:
         # Rounding errors must not decide the order of directions.
         direction = np.round(self._gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
-        # (interfaces, c) stiffnesses of the bonds, infinite where they are rigid.
-        self._stiffness = np.array(phase_laws.springs(cell.case, cell.solver.problem).stiffness)
         self._tree = cKDTree(in_cell(self.points, self._period), boxsize=self._period)
         # (k, 2) body boundary nodes on all ranks, and (k,) their bodies, -1 at voids. Each body has its own nodes
         # where two bodies meet; cuts between a body's pieces are not boundaries.
@@ -162,22 +159,24 @@ class EnergyReleaseRates:
         jump[np.abs(jump) < self.interface.scales.gap_noise(solution.strain)] = 0.0
         force[np.abs(force) < self._gathered(self.interface.scales.force_noise(solution))[:, None]] = 0.0
         closing, length = self._closing(tips, status, force, jump)
-        stiffness = self._stiffness[self.pair[tips.node]]
-        is_rigid = np.isinf(stiffness)
-        traction = force[tips.node] / self.length[tips.node, None]
+        components = np.arange(force.shape[1])
+        compliance = self._gathered(solution.compliance[self.interface.nodes.row[:, None] + components])
+        springs = compliance * force**2 / (2 * self.length[:, None])
+        work = np.where(compliance[tips.node] == 0.0, closing, springs[tips.node])
         if in_plane:
-            traction[:, 0] = np.maximum(traction[:, 0], 0.0)  # pressed faces do not part
-        modes, rates = np.zeros((len(tips.node), 3)), np.where(is_rigid, closing, traction**2 / (2 * stiffness))
-        rigid = np.flatnonzero(is_rigid.all(axis=1))
-        work = closing[rigid].sum(axis=1, keepdims=True)
-        fraction = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
-        rates[rigid] = fraction * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
-        modes[:, slice(2) if in_plane else slice(2, 3)] = response.scale**2 * rates
+            work[(compliance[tips.node, 0] > 0.0) & (force[tips.node, 0] < 0.0), 0] = 0.0  # pressed faces do not part
+        released = np.maximum(0.0, self._released(tips, response, springs.sum(axis=1)))
+        share = released / np.where(work.any(axis=1), work.sum(axis=1), 1.0)
+        modes = np.zeros((len(tips.node), 3))
+        modes[:, components if in_plane else [2]] = response.scale**2 * share[:, None] * work
         fibre, pair, direction = self.fibre[tips.node], self.pair[tips.node], self.direction[tips.node]
         return EnergyRelease(fibre=fibre, pair=pair, direction=direction, modes=modes, length=length)
 
-    def _released(self, tips: debonded_arcs.CrackTips, response: Response) -> Float:
-        """Return G (t,) by a virtual crack extension at each tip, for the state before scaling.  Collective."""
+    def _released(self, tips: debonded_arcs.CrackTips, response: Response, springs: Float) -> Float:
+        """Return G (t,) by a virtual crack extension at each tip, for the state before scaling.  Collective.
+
+        `springs` (n,) are the energies per length of elastic bonds at the interface nodes.
+        """
         if not len(tips.node):
             return np.zeros(0)
         solution, bodies, position = response.state.solution, self.bodies[tips.node], self.points[tips.node]
@@ -198,9 +197,20 @@ class EnergyReleaseRates:
         for extension, of_body in zip(self._extensions, np.split(u, ends[:-1]), strict=False):
             for t in np.flatnonzero((bodies == extension.subdomain.submesh.body).any(axis=1)):
                 change[t] += extension.energy_change(position[t], spokes[t], reach[t], of_body, solution.strain)
-        turn = self.direction[tips.node] - self.direction[tips.behind]
-        outward = np.sign((turn + 180.0) % 360.0 - 180.0)
-        return np.asarray(-outward * distributed_arrays.allreduce_sum(self.cell.comm, change) / self.radius[tips.node])
+        change = distributed_arrays.allreduce_sum(self.cell.comm, change)
+        # Elastic bonds between nodes of different q become longer or shorter: the integral of their energy over dq.
+        elastic = (self._chains.neighbours[:, 0] >= 0) & np.isfinite(self.radius) & (springs > 0.0)
+        pair = self._chains.neighbours[elastic].T
+        energy = springs[elastic] * self._turn(*pair) / 2
+        for t, tip in enumerate(position):
+            before, after = turning_fraction(nearest_image(self.points[pair] - tip, period), reach[t])
+            change[t] += radius[t] * energy @ (after - before)
+        return np.asarray(-self._turn(tips.behind, tips.node) * change / self.radius[tips.node])
+
+    def _turn(self, start: Int, end: Int) -> Float:
+        """Return the signs (k,) of the turns from interface nodes to others on the same circle."""
+        degrees = self.direction[end] - self.direction[start]
+        return np.asarray(np.sign((degrees + 180.0) % 360.0 - 180.0))
 
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """Return the work that closes each crack, from forces and jumps (n, c), and the closed lengths (t,).
@@ -236,3 +246,8 @@ class EnergyReleaseRates:
 def nearest_image(offset: Float, period: Float) -> Float:
     """Return offsets (..., 2) shifted to their shortest periodic images."""
     return np.asarray(offset - np.round(offset / period) * period)
+
+
+def turning_fraction(offset: Float, reach: float) -> Float:
+    """Return the factors q (..) at offsets (.., 2) from a tip: 1 in the core, 0 beyond `reach`."""
+    return np.asarray(np.clip((reach - np.linalg.norm(offset, axis=-1)) / (reach * (1 - CORE)), 0.0, 1.0))

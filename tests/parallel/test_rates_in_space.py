@@ -47,7 +47,7 @@ def loaded(comm, load, opening, bond, centre=20.0, materials=PHASES, **cell):
         (ALL, {"order": 1, "refine": 2}, 6e-3),
         (ALL, {"materials": INCOMPRESSIBLE}, 2e-3),
         (ALL | {"E11": -0.4}, {"bond": TOUCHING}, 2e-3),
-        (ALL, {"bond": SPRINGS, "tip_size": 2e-4}, 5e-3),
+        (ALL, {"bond": SPRINGS}, 5e-3),
     ],
     ids=["along the fibres", "axial shear", "heat", "all", "linear", "incompressible", "contact", "springs"],
 )

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from reference import monolithic
 
-from feti_homog.fem.shape_functions import energy_change, gradients
+from feti_homog.fem import AXIAL as AXIAL_SHEAR
+from feti_homog.fem import PLANE
+from feti_homog.fem.shape_functions import ElementFields, gradients
 
 L = np.array([[9.0, 2.0, 1.0], [2.0, 8.0, 0.5], [1.0, 0.5, 3.0]])
 ISOTROPIC = np.array([[9.0, 7.0, 0.0], [7.0, 9.0, 0.0], [0.0, 0.0, 1.0]])
@@ -14,6 +16,13 @@ LOADED = np.array([[9.0, 2.0, 1.0, 3.0, -4.0], [2.0, 8.0, 0.5, 2.0, -3.0], [1.0,
 AXIAL = np.array([[2.0, 0.3], [0.3, 1.0]])
 NONE = np.zeros(0)
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.1], [0.2, 0.9]])
+
+
+def energy_change(points, u, A, uniform, moved, changed, is_mixed=False):
+    """Return the rate of the energy of one load, by the fields of the elements."""
+    problem = PLANE if u.shape[2] == 2 else AXIAL_SHEAR
+    fields = ElementFields.of(problem, points, u[..., None], A, np.zeros((problem.strains, 1)), is_mixed)
+    return fields.change(A, uniform[:, None], moved, changed[..., None]).item() / 2
 
 
 def energy(points, u, is_mixed=False):
