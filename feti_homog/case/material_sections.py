@@ -79,12 +79,9 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())
-    if has_coatings and phase_names.COATING not in materials:
-        return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
-    if not has_coatings and phase_names.COATING in materials:
-        expected = "expected [cell] coating, or a column of a table"
-        return [f"[material.{phase_names.COATING}]: no fibre has a coating; {expected}"]
-    return []
+    no_coating = "no fibre has a coating; expected [cell] coating, or a column of a table"
+    fault = "missing section; [cell] has coatings" if has_coatings else no_coating
+    return [f"[material.{phase_names.COATING}]: {fault}"] * (has_coatings != (phase_names.COATING in materials))
 
 
 def _read_material(
@@ -132,7 +129,7 @@ def _known_stress(material: material_forms.Material, plane: str | None) -> None:
 
 
 def missing_expansions(tables: object, needed_by: str) -> list[str]:
-    """List material tables without the thermal expansion that the key `needed_by` requires.
+    """List material tables without the thermal expansion that `needed_by`, a key or a result, requires.
 
     Tables with unknown keys, which may be misspelt expansions, are skipped.
     """
@@ -145,12 +142,18 @@ def missing_expansions(tables: object, needed_by: str) -> list[str]:
     return faults
 
 
-def unlike_moduli(materials: Mapping[str, material_forms.Material]) -> list[str]:
-    """List fibres softer than the matrix, or stiffer by more than the ratio of GPa to MPa, one per line."""
+def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
+    """List fibres softer than the matrix or stiffer by more than GPa / MPa, and expansions above 1 %, one per line."""
+    expansions = [
+        f"[material.{wording.toml_key(phase)}] {name} = {wording.toml_value(value)}: is it in units of 1e-6?"
+        for phase, material in materials.items()
+        for name, value in vars(material).items()
+        if name.startswith("expansion") and value is not None and np.abs(value).max() > 1e-2
+    ]
     names = "young", "stiffness", "E1", "E2", "E3", "E_axial", "E_transverse"
     moduli = {k: max(float(np.max(vars(m).get(name) or 0.0)) for name in names) for k, m in materials.items()}
     matrix = moduli.pop(phase_names.MATRIX, 0.0)
-    return [
+    return expansions + [
         f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are both in one unit?"
         for phase, value in moduli.items()
         if phase != phase_names.COATING and value * matrix and not matrix <= value <= 1e3 * matrix
