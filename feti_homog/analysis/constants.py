@@ -121,7 +121,8 @@ def response_errors(
 
     Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
     """
-    if context.states.is_recording or context.case.output.sensitivities:
+    has_tips = any(response.debonded for group in groups for response in group)
+    if context.states.is_recording or context.case.output.sensitivities or has_tips:
         groups = [*map(recovered_fields.with_displacements, (p.cell for p in context.loads.problems), groups)]
     if not context.case.output.mesh_error:
         return [], [*chain(*groups)]

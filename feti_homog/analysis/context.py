@@ -21,7 +21,6 @@ from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization import energy_release
     from feti_homog.results import checkpoints
 
 
@@ -187,13 +186,6 @@ class AnalysisContext:
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
         return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening(self)}", room)
-
-    @cached_property
-    def release_rates(self) -> list[energy_release.EnergyReleaseRates]:
-        """Return the energy release rates at tips of arcs, one for each problem.  Collective when first read."""
-        from feti_homog.homogenization import energy_release  # bonded cells have no tips
-
-        return [energy_release.EnergyReleaseRates(problem.cell, problem.interface) for problem in self.loads.problems]
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:

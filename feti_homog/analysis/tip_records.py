@@ -43,11 +43,13 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
 
     A unit load has one response, in the problem with a load of this name; other loads have one in each problem.
     """
-    rates = list[tuple[energy_release.EnergyRelease, str]]()
+    rates, debonded = list[tuple[energy_release.EnergyRelease, str]](), any(r[0].debonded for r in responses.values())
+    zones = [(problem, energy_release.TipZones(problem.cell)) for problem in context.loads.problems if debonded]
     for load, parts in responses.items():
         if parts[0].debonded:
-            problems = [p for p in context.release_rates if load.lstrip("-") in p.cell.solver.problem.loads]
-            at = [rate.of(part) for rate, part in zip(problems or context.release_rates, parts, strict=False)]
+            loaded = [(problem, zone) for problem, zone in zones if load.lstrip("-") in problem.loads] or zones
+            pairs = zip(loaded, parts, strict=False)
+            at = [zone.release(part, problem.interface) for (problem, zone), part in pairs]
             rates.append((replace(at[0], modes=np.sum([part.modes for part in at], axis=0)), load))
     names = ("fibre", "interface", "angle", "G", "G_I", "G_II", "G_III", "psi", "length")
     columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in rates]

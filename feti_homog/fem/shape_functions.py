@@ -219,8 +219,7 @@ class ElementFields:
         grad_u = (-grad_V @ self.slopes.reshape(*grad_V.shape[:3], -1)).reshape(self.slopes.shape)
         grad_u += 0.0 if changed is None else slopes(self.gradients, changed)
         change = strains(grad_u, self.problem)
-        loads = np.broadcast_to(uniform, (*self.weights.shape, *uniform.shape))
-        strain = np.concatenate([self.strain, loads], axis=2)
+        strain = np.concatenate([self.strain, np.broadcast_to(uniform, (*self.weights.shape, *uniform.shape))], axis=2)
         work = self.weights[..., None, None] * (A @ strain)
         half = div_V / 2 * strain
         half[:, :, : self.problem.strains] += change
