@@ -75,7 +75,7 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "load: a unit strain `E11`, ..., or `temperature`, minus a unit load `-E11`, ..., or the given load `strain`"
+        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., or the given load `strain`"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")

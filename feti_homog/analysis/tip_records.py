@@ -39,14 +39,14 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:
-    """Return energy release rates at tips under each load; empty without tips.  Collective.
+    """Return energy release rates at tips under each load but a unit temperature; empty without tips.  Collective.
 
     A unit load has one response, in the problem with a load of this name; other loads have one in each problem.
     """
     rates, debonded = list[tuple[energy_release.EnergyRelease, str]](), any(r[0].debonded for r in responses.values())
     zones = [(problem, energy_release.TipZones(problem.cell)) for problem in context.loads.problems if debonded]
     for load, parts in responses.items():
-        if parts[0].debonded:
+        if parts[0].debonded and not load.endswith("temperature"):
             loaded = [(problem, zone) for problem, zone in zones if load.lstrip("-") in problem.loads] or zones
             pairs = zip(loaded, parts, strict=False)
             at = [zone.release(part, problem.interface) for (problem, zone), part in pairs]
