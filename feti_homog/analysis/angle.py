@@ -39,7 +39,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
             context.states.record({label: responses}, 1.0, number)
         starts = [r.state.solution.lam for r in responses]
-        point["tips"] = tip_rates(context, responses, context.loads.names if unit else ("strain",))
+        loads = context.loads.names if unit else ("strain",)
+        point["tips"] = tip_rates(context, {load: [r] for load, r in zip(loads, responses, strict=True)})
         points.append(AnglePoint(**point | context.point(responses)))
     note_accuracy(context, max(point.mesh_error or 0.0 for point in points))
     return {"angle": tuple(points)}

@@ -22,7 +22,7 @@ from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization import energy_release, mesh_estimate
+    from feti_homog.homogenization import mesh_estimate
     from feti_homog.results import checkpoints
 
 
@@ -173,7 +173,8 @@ class AnalysisContext:
 
         Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
         """
-        if self.states.is_recording or self.case.output.sensitivities:
+        has_tips = any(response.debonded for group in groups for response in group)
+        if self.states.is_recording or self.case.output.sensitivities or has_tips:
             groups = [*map(recovered_fields.with_displacements, (p.cell for p in self.loads.problems), groups)]
         if not self.case.output.mesh_error:
             return [], [*chain(*groups)]
@@ -217,13 +218,6 @@ class AnalysisContext:
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
         return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening(self)}", room)
-
-    @cached_property
-    def release_rates(self) -> energy_release.EnergyReleaseRates:
-        """Return the energy release rates at the tips of debonded arcs.  Collective when first read."""
-        from feti_homog.homogenization import energy_release  # bonded cells have no tips
-
-        return energy_release.EnergyReleaseRates(self.cell, self.plane.interface)
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:

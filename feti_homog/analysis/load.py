@@ -6,13 +6,13 @@ from feti_homog.analysis.constants import note_accuracy, state_error
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
-from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
+from feti_homog.analysis.tip_records import tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entry `load`, the equilibrium with prescribed debonded faces.  Collective.
 
-    The point has `tips` on debonded arcs for a load in the plane.  The case may also ask for `sensitivities`.
+    The point has `tips` on debonded arcs.  The case may also ask for `sensitivities`.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     load, bonds = context.loads.load(target), context.bonds(None)
@@ -24,9 +24,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     note_accuracy(context, max(error.values(), default=0.0))
     context.states.record({"load": responses}, 1.0, 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
-    strains = zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True)
-    only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)
-    if context.case.interface is not None and only_in_plane:
-        point["tips"] = tip_rates(context, responses[:1], ["strain"])
+    if context.case.interface is not None:
+        point["tips"] = tip_rates(context, {"strain": responses})
     rates = load_sensitivities(context, load, responses) if context.case.output.sensitivities else {}
     return {"load": LoadPoint(**point)} | rates

@@ -69,21 +69,21 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """The energy release rates at tips of arcs, at constant macroscopic strain.
+    """The energy release rates at tips of arcs, at constant macroscopic strain and temperature.
 
     Only round fibres have rates.  The t pairs of a load and a tip are sorted by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(
-        "load: a unit strain `E11`, `E22` or `gamma12`, minus a unit strain `-E11`, ..., or the given strain `strain`; "
-        "other loads have no rates"
+        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., or the given load `strain`"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")
     G: Float = described("energy released per area of growing debonding", ENERGY, "(t,)")
     G_I: Float = described("its part in opening", ENERGY, "(t,)")
     G_II: Float = described("its part in shear", ENERGY, "(t,)")
-    psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", records.DEGREES, "(t,)")
+    G_III: Float | None = described("along the fibre, in generalized plane strain", ENERGY, "(t,)", default=None)
+    psi: Float = described("its mode, tan^2 psi = (G_II + G_III) / G_I: 0 opens, 90 shears", records.DEGREES, "(t,)")
     length: Float = described("length behind the tip at which rigid bonds separate the modes", records.LENGTH, "(t,)")
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
@@ -237,9 +237,7 @@ class LoadPoint:
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described(DEBONDED_LENGTH, records.LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, records.DEGREES, "(f,)")
-    tips: TipRates | None = described(
-        "energy release rates at the tips of its arcs; absent unless only in-plane strains act", default=None
-    )
+    tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")

@@ -18,18 +18,18 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, errors, responses = context.unit_states(bonds, starts)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, loads, errors_of_minus = list(responses), list(context.loads.names), errors[:0]
+    under, errors_of_minus = dict(zip(context.loads.names, responses, strict=True)), errors[:0]
     if one_sided:
         minus, errors_of_minus, under_minus = context.unit_states(bonds, starts, -1.0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
-        under, loads = [*under, *under_minus], [*loads, *(f"-{name}" for name in loads)]
+        under |= {f"-{name}": response for name, response in zip(context.loads.names, under_minus, strict=True)}
     else:
         context.checks.require("L^ef", {"symmetry": averaging.asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
         from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
 
-        document["tips"] = tip_rates(context, under, loads)
+        document["tips"] = tip_rates(context, {load: [response] for load, response in under.items()})
     document |= constants(context.cell, document)
     if context.case.output.sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs need sensitivities

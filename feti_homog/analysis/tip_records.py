@@ -1,6 +1,7 @@
 """Collect the debonding tips in result.json, with their bond law, driving energies, release rates and modes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,12 @@ from mpi4py import MPI
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import TipRates, Tips
 from feti_homog.errors import CaseError
-from feti_homog.homogenization import averaging, unit_cell
+from feti_homog.homogenization import averaging, energy_release, unit_cell
 from feti_homog.interface.contact import BONDED
 from feti_homog.interface.laws import UTILISATION_TIE, BondLaw, energy
 from feti_homog.interface.path import path_points
-from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
-# Loads under which tips have energy release rates; "strain" is a prescribed strain.
-IN_PLANE_LOADS = (*voigt.STRAINS, "strain")
 # Decimals of directions in sorts: rounding differs from rank to rank, and must not change the order.
 DIRECTION_DIGITS = 9
 
@@ -40,20 +38,27 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     return energy.ReleasedEnergy.of(law, *inverses)
 
 
-def tip_rates(context: AnalysisContext, responses: Sequence[averaging.Response], loads: Sequence[str]) -> TipRates:
-    """Return energy release rates at tips under the in-plane loads among `loads`; empty without tips.  Collective."""
-    rates = [
-        (context.release_rates.of(response), load)
-        for response, load in zip(responses, loads, strict=True)
-        if load.lstrip("-") in IN_PLANE_LOADS and response.debonded
-    ]
-    names = ("fibre", "interface", "angle", "G", "G_I", "G_II", "psi", "length")
+def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:
+    """Return energy release rates at tips under each load but a unit temperature; empty without tips.  Collective.
+
+    A unit load has one response, in the problem with a load of this name; other loads have one in each problem.
+    """
+    rates, debonded = list[tuple[energy_release.EnergyRelease, str]](), any(r[0].debonded for r in responses.values())
+    zones = [(problem, energy_release.TipZones(problem.cell)) for problem in context.loads.problems if debonded]
+    for load, parts in responses.items():
+        if parts[0].debonded and not load.endswith("temperature"):
+            loaded = [(problem, zone) for problem, zone in zones if load.lstrip("-") in problem.loads] or zones
+            pairs = zip(loaded, parts, strict=False)
+            at = [zone.release(part, problem.interface) for (problem, zone), part in pairs]
+            rates.append((replace(at[0], modes=np.sum([part.modes for part in at], axis=0)), load))
+    names = ("fibre", "interface", "angle", "G", "G_I", "G_II", "G_III", "psi", "length")
     columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in rates]
     arrays = map(np.concatenate, zip(*columns, strict=True)) if rates else [np.zeros(0)] * len(names)
     table: dict[str, Any] = dict(zip(names, arrays, strict=True))
     table |= {
         "fibre": tuple(table["fibre"].astype(int).tolist()),
         "load": tuple(x for at, x in rates for _ in at.fibre),
+        "G_III": table["G_III"] if context.cell.axial else None,
     }
     return TipRates(**table | {"interface": _sections(context.cell, table["interface"])})
 

@@ -13,7 +13,7 @@ from feti_homog.case import bond_laws, cell_sizes, sections
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
-from feti_homog.case.material_sections import provider, read_materials, unlike_moduli
+from feti_homog.case.material_sections import provider, read_materials, unlike_units
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES, Rule
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
@@ -158,7 +158,7 @@ class Case:
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else (*self.cell.table.remarks, *cell_sizes.default_size(self.cell))
         of_load = *stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane)
-        return *of_elements, *unlike_moduli(self.materials), *of_table, *of_load
+        return *of_elements, *unlike_units(self.materials), *of_table, *of_load
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a document; `parse` turns it into an equal case."""

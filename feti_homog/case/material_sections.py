@@ -80,12 +80,9 @@ def coating_faults(cell: Cell | None, materials: object) -> list[str]:
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())
-    if has_coatings and phase_names.COATING not in materials:
-        return [f"[material.{phase_names.COATING}]: missing section; [cell] has coatings"]
-    if not has_coatings and phase_names.COATING in materials:
-        expected = "expected [cell] coating, or a column of a table"
-        return [f"[material.{phase_names.COATING}]: no fibre has a coating; {expected}"]
-    return []
+    no_coating = "no fibre has a coating; expected [cell] coating, or a column of a table"
+    fault = "missing section; [cell] has coatings" if has_coatings else no_coating
+    return [f"[material.{phase_names.COATING}]: {fault}"] * (has_coatings != (phase_names.COATING in materials))
 
 
 def _read_material(
@@ -133,7 +130,7 @@ def _known_stress(material: material_forms.Material, plane: str | None) -> None:
 
 
 def missing_expansions(tables: object, needed_by: str) -> list[str]:
-    """List material tables without the thermal expansion that the key `needed_by` requires.
+    """List material tables without the thermal expansion that `needed_by`, a key or a result, requires.
 
     Tables with unknown keys, which may be misspelt expansions, are skipped.
     """
@@ -146,19 +143,21 @@ def missing_expansions(tables: object, needed_by: str) -> list[str]:
     return faults
 
 
-def unlike_moduli(materials: Mapping[str, material_forms.Material]) -> list[str]:
-    """List moduli that seem to have different units, one line per phase.
+def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
+    """List moduli that seem to have different units, and expansions above 1 %, one per line.
 
     GPA_TO_MPA bounds the ratio of two moduli in one phase, and of fibre to matrix; no fibre is softer than the matrix.
     """
     lines, largest = list[str](), dict[str, float]()
     for phase, material in materials.items():
-        named = vars(material).items()
+        section, named = f"[material.{wording.toml_key(phase)}]", vars(material).items()
+        for name, value in named:
+            if name.startswith("expansion") and value is not None and np.abs(value).max() > 1e-2:
+                lines.append(f"{section} {name} = {wording.toml_value(value)}: is it in units of 1e-6?")
         moduli = {name: value for name, value in named if value and name.startswith(("young", "E", "G"))}
         if moduli and max(moduli.values()) >= GPA_TO_MPA * min(moduli.values()):
             high, low = (choose(moduli, key=moduli.__getitem__) for choose in (max, min))
-            pair = f"{high} {moduli[high]:g}, {low} {moduli[low]:g}"
-            lines.append(f"[material.{wording.toml_key(phase)}] {pair}: are both in one unit?")
+            lines.append(f"{section} {high} {moduli[high]:g}, {low} {moduli[low]:g}: are both in one unit?")
         largest[phase] = float(np.max([*moduli.values(), *np.ravel(vars(material).get("stiffness", 0.0))]))
     matrix = largest.pop(phase_names.MATRIX, 0.0)
     return lines + [

@@ -42,12 +42,9 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
         if path.increments is not None and path.increments < len(placed):
             faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
     for kind, section in (("load", load), ("path", path)):
-        placed = {} if section is None else section.placed
-        heated += [
-            f"[{kind}] {place}.{load_sections.TEMPERATURE}"
-            for place, given in placed.items()
-            if load_sections.TEMPERATURE in load_sections.named(given)
-        ]
+        for place, given in section.placed.items() if section is not None else ():
+            is_heated = load_sections.TEMPERATURE in load_sections.named(given)
+            heated += [f"[{kind}] {place}.{load_sections.TEMPERATURE}"] * is_heated
     if envelope is not None and envelope.temperature is not None:
         heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:

@@ -73,10 +73,11 @@ class ArcSides:
         return cls(element, side, nodes, points, normals, area, at_void[edge])
 
 
-def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
+def arc_energy(body: RecoveredStress, sides: ArcSides, weights: Float) -> Float:
     """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.
 
-    Diagonal entries are twice the energy error.  With recovered stresses sigma, the estimate is
+    Diagonal entries are twice the energy error; each side has a weight (f,).  With recovered stresses sigma, the
+    estimate is
 
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 
@@ -104,14 +105,15 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
         turn *= (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
         gradient[:, 0, 1] += turn
         gradient[:, 1, 0] -= turn
-    work = _summed(sides.area, _along(stress[:, body.problem.voigt], normal), _along(gradient, normal))
-    rate = _summed(sides.area, loads, body.L @ loads) - work - work.T
+    area = weights * sides.area
+    work = _summed(area, _along(stress[:, body.problem.voigt], normal), _along(gradient, normal))
+    rate = _summed(area, loads, body.L @ loads) - work - work.T
     order, last = body.order, len(sides.nodes[0]) - 1
     stress = np.stack([_at(body, sides, fraction) for fraction in np.arange(last + 1) / last], axis=1)
     tractions = np.diff(_along(stress[:, :, body.problem.voigt], sides.normals), n=order, axis=1)[:, 0]
     imposed = np.einsum("cdk,fpd->fpck", macroscopic, sides.points)
     u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
-    interpolation = _summed(h[:, 0] / (12 if order == 1 else 60), tractions, u)
+    interpolation = _summed(weights * h[:, 0] / (12 if order == 1 else 60), tractions, u)
     return -np.asarray(rate + interpolation + interpolation.T)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.fem.shape_functions import HESSIANS, MixedElements, affine_couples, gradients
+from feti_homog.fem.shape_functions import HESSIANS, MixedElements, affine_couples, gradients, slopes, strains
 from feti_homog.mesh import FineMesh, ReferenceLattice, Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
@@ -102,12 +102,11 @@ def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_mat
 def element_strain(points: Float, triangles: Int32, u: Float, problem: Problem) -> Float:
     """Compute the mean element strains (e, m) under displacements u (n, c) of the nodes."""
     strain = np.empty((len(triangles), problem.strains))
-    parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
         g, w = gradients(points[triangles[part]])
         mean = np.einsum("eqad,eq->ead", g, w) / w.sum(axis=1)[:, None, None]
-        gradient = np.einsum("eai,ead->eid", u[triangles[part]], mean)
-        strain[part] = np.stack([gradient[:, i, d].sum(axis=1) for i, d in parts_of], axis=1)
+        gradient = slopes(mean[:, None], u[triangles[part]][..., None])
+        strain[part] = strains(gradient, problem)[:, 0, :, 0]
     return strain
 
 

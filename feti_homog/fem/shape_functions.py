@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.typing import Float
 
 # The 6-point rule for quadratic triangles is exact to degree 4 (Dunavant 1985): it integrates the stiffness and the
@@ -140,12 +141,6 @@ class MixedElements:
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
 
-    def strain(self, u: Float) -> Float:
-        """Compute strains (e, q, 3, k) under displacements (e, 7, 2, k)."""
-        e, q, a, _ = self.gradients.shape
-        slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
-        return voigt(slope.reshape(e, q, 2, 2, -1))
-
     def dilatation(self, u: Float) -> Float:
         """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
@@ -154,7 +149,7 @@ class MixedElements:
     def stress(self, u: Float) -> Float:
         """Compute stresses 2 mu eps + p I, (e, q, 3, k), under displacements (e, 7, 2, k)."""
         first, shear = self.lame
-        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
+        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * strains(slopes(self.gradients, u), PLANE)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
@@ -177,63 +172,72 @@ class MixedElements:
 
 
 @dataclass(frozen=True)
-class PointFields:
-    """The fields in e elements at q quadrature points, with components in the order [11, 22, 12].
+class ElementFields:
+    """The fields in e elements at q points under k loads.
+
+    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
+    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
 
     Attributes:
-        gradients, weights: gradients (e, q, a, 2) of the shape functions, a bubble last, and weights (e, q).
-        u: (e, a, 2) displacements, in mixed elements also of the bubble.
-        strain, stress: (e, q, 3) strains and stresses.
-        density: (e, q) strain energy density: sigma : eps / 2, plus p (div u - p / lambda) / 2 in mixed elements.
+        problem: the c displacements, and their m strains.
+        gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
+        slopes: (e, q, 2, c, k) du_i / dx_d.
+        strain: (e, q, m, k) with the loads.
+        rest: (e, q, k) r; None unless the elements are mixed.
     """
 
+    problem: Problem
     gradients: Float
     weights: Float
-    u: Float
+    slopes: Float
     strain: Float
-    stress: Float
-    density: Float
+    rest: Float | None
+
+    @classmethod
+    def of(cls, problem: Problem, points: Float, u: Float, A: Float, loads: Float, is_mixed: bool) -> ElementFields:
+        """Compute the fields from nodes (e, a, 2), displacements u (e, a, c, k), laws A (v, v) and strains (m, k)."""
+        if not is_mixed:
+            g, w = gradients(points)
+            grad_u = slopes(g, u)
+            return cls(problem, g, w, grad_u, strains(grad_u, problem) + loads, None)
+        elements, inner = MixedElements.of(points, A), u.shape[1]
+        u = elements.with_bubble(u)
+        grad_u, g = slopes(elements.gradients, u), elements.gradients[:, :, :inner]
+        rest = np.trace(grad_u, axis1=2, axis2=3) - elements.dilatation(u)
+        return cls(problem, g, elements.weights, grad_u, strains(grad_u, problem) + loads, rest)
+
+    def change(self, A: Float, uniform: Float, moved: Float, changed: Float | None = None) -> Float:
+        """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V, and u at the nodes by s U.
+
+        The derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with d grad u = grad U - grad V grad u,
+        exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183).  A is (v, v), `uniform` (v - m, k)
+        has the loads after the m strains, `moved` is V (e, a, 2), and `changed` is U (e, a, c, k), by default 0.
+        """
+        grad_V = slopes(self.gradients, moved[..., None])[..., 0]
+        div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
+        grad_u = (-grad_V @ self.slopes.reshape(*grad_V.shape[:3], -1)).reshape(self.slopes.shape)
+        grad_u += 0.0 if changed is None else slopes(self.gradients, changed)
+        change = strains(grad_u, self.problem)
+        strain = np.concatenate([self.strain, np.broadcast_to(uniform, (*self.weights.shape, *uniform.shape))], axis=2)
+        work = self.weights[..., None, None] * (A @ strain)
+        half = div_V / 2 * strain
+        half[:, :, : self.problem.strains] += change
+        rate = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
+        if self.rest is not None:
+            half = change[:, :, 0] + change[:, :, 1] + div_V[..., 0] / 2 * self.rest
+            rate -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
+        return np.asarray(rate + rate.T)
 
 
-def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> PointFields:
-    """Compute the fields in elements, mixed if `is_mixed`, from nodes `points` and u (e, a, 2), and L (3, 3)."""
-    if not is_mixed:
-        g, weights = gradients(points)
-        strain = voigt(np.einsum("eai,eqad->eqid", u, g))
-        stress = strain @ L
-        return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
-    elements = MixedElements.of(points, L)
-    inner = elements.with_bubble(u[..., None])
-    strain, stress, mean = (field(inner)[..., 0] for field in (elements.strain, elements.stress, elements.dilatation))
-    off = strain[..., 0] + strain[..., 1] - mean
-    density = ((stress * strain).sum(axis=2) + elements.lame[0] * mean * off) / 2
-    return PointFields(elements.gradients, elements.weights, inner[..., 0], strain, stress, density)
+def slopes(g: Float, u: Float) -> Float:
+    """Return the slopes du_i / dx_d (e, q, 2, c, k) from gradients (e, q, a, 2) and displacements (e, a, c, k)."""
+    e, q, a, _ = g.shape
+    return np.asarray((g.transpose(0, 1, 3, 2).reshape(e, -1, a) @ u.reshape(e, a, -1)).reshape(e, q, 2, *u.shape[2:]))
 
 
-def voigt(gradient: Float) -> Float:
-    """Return the strains [11, 22, 12] (e, q, 3, ..) of displacement gradients (e, q, 2, 2, ..)."""
-    shear = gradient[:, :, 0, 1] + gradient[:, :, 1, 0]
-    return np.stack([gradient[:, :, 0, 0], gradient[:, :, 1, 1], shear], axis=2)
-
-
-def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
-    """Compute the energy rate of elements whose nodes and displacements change.
-
-    With nodes at x + s dx, displacements u + s du and energy density W, the rate d/ds sum_e int W at s = 0 is
-
-        int sigma : (grad du - grad u grad dx) + W div dx,
-
-    exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183): the bubble and the pressure of mixed
-    elements stay constant, because the energy is stationary in both.
-
-    Args:
-        points, u: (e, a, 2) element nodes and their displacements.
-        L, is_mixed: (3, 3) stiffness, and whether the elements have a bubble and a pressure.
-        moved, changed: (e, a, 2) dx and du.
-    """
-    fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
-    grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)
-    of_nodes = fields.gradients[:, :, :nodes]
-    grad_moved, grad_changed = (np.einsum("eai,eqad->eqid", field, of_nodes) for field in (moved, changed))
-    change = (fields.stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
-    return float((fields.weights * (change + fields.density * np.trace(grad_moved, axis1=2, axis2=3))).sum())
+def strains(slope: Float, problem: Problem) -> Float:
+    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
+    strain = np.zeros((*slope.shape[:2], problem.strains, slope.shape[4]))
+    for (i, d), number in np.ndenumerate(problem.voigt):
+        strain[:, :, number] += slope[:, :, d, i]
+    return strain

@@ -16,7 +16,7 @@ import numpy as np
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
-from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions
+from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions, slopes, strains
 from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
@@ -119,13 +119,7 @@ class RecoveredStress:
             stress, weights = elements.stress(elements.with_bubble(u)), elements.weights
         else:
             g, weights = gradients(corners)
-            (e, a, c, k), q = u.shape, g.shape[1]
-            flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
-            gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
-            for number in range(m):
-                i, d = np.nonzero(self.problem.voigt == number)
-                strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
-            stress = self.L[:m, :m] @ strain
+            stress = self.L[:m, :m] @ strains(slopes(g, u), self.problem)
         points = shape_functions(6, barycentric(6)) @ corners
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
@@ -198,10 +192,11 @@ class RecoveredStress:
             result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
         return result.reshape(*points.shape[:2], *shape)
 
-    def difference(self) -> tuple[Float, Float]:
+    def difference(self, weights: Float) -> tuple[Float, Float]:
         """Compute the energy products of the difference ds between recovered and element stresses.
 
-        Returns int ds_i : S : ds_j (k, k), S the flexibility, and its diagonal (e, k) by element.
+        Returns int ds_i : S : ds_j (k, k), with the flexibility S and element `weights` (e,), and the diagonal (e, k)
+        by element, without weights.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]
@@ -221,7 +216,7 @@ class RecoveredStress:
                 difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
                 difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)
             difference = (difference.reshape(-1, m * k) @ root).reshape(difference.shape)
-            flat = difference.reshape(-1, k)
-            total += flat.T @ flat
+            flat, weighted = difference.reshape(-1, k), difference * weights[chunk.part, None, None]
+            total += flat.T @ weighted.reshape(-1, k)
             shares.append(np.einsum("qemk,qemk->ek", difference, difference))
         return total, np.concatenate(shares)

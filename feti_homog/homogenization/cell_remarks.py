@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
-from feti_homog.materials import engineering_constants, laws
+from feti_homog.materials import engineering_constants, laws, voigt
 from feti_homog.mesh import CoarseMesh, Torus, submeshes
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
@@ -113,16 +113,20 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on sides that are not periodic, else on order, seed, teeth and fibre fraction.
+    """List remarks on missing expansions, then on sides that are not periodic, or on order, seed, teeth and fraction.
 
     `bonds` is the number of bonds with teeth, 0 if unknown.
     """
-    cell, lines = case.cell, tuple[str, ...]()
+    cell, missing = case.cell, [name for name, m in case.materials.items() if laws.expansion(m) is None]
+    lines = tuple[str, ...]()
+    if case.analysis.plane == voigt.GENERALIZED.name and 0 < len(missing) < len(case.materials):
+        phases = ", ".join(f"[material.{wording.toml_key(phase)}]" for phase in missing)
+        lines = (f"{phases} expansion: missing; without it the cell has no thermal expansion",)
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
-        return (f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one',)
+        return (*lines, f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one')
     if case.analysis.type == "envelope" and cell.order == 1:
-        lines = ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
+        lines += ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
     if cell.geometry == "random" and case.output.mesh_error and case.analysis.type not in ("load", "path", "angle"):
         lines += ('[cell] geometry = "random": "+-" of one cell has mesh errors; its scatter: realisations in [sweep]',)
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:

@@ -43,10 +43,10 @@ class EnergyErrors:
     """The errors (k, k) in the energies E_i . Sigma_j of k responses.
 
     Attributes:
-        elements: int ds_i : S : ds_j / area, with ds the recovered stresses less the element stresses, plus the
-            spring energy beyond tips; this error makes the stiffness too high.
+        elements: int ds_i : S : ds_j / area, with ds the recovered stresses less the element stresses, the errors at
+            tips (`TipZones`), and the spring energy beyond tips; this error makes the stiffness too high.
         arcs: errors from straight or parabolic sides along arcs, and from springs along sides, of either sign.
-        shares: (m, k) contributions of this rank's elements to the diagonal of `elements`.
+        shares: (m, k) contributions of this rank's elements to the diagonal of `elements`, without errors at tips.
         least_of_two: least estimate of an error i != j over sqrt(a_i a_j), with a_i = |elements_ii| + |arcs_ii|.
     """
 
@@ -89,11 +89,21 @@ def energy_errors(
     fewer = cell.lattice.halvings - lattice.halvings
     sums, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
     of_elements, of_arcs = factors(cell, fewer)
+    zones = singular = None
+    if any(response.debonded for response in responses):
+        from feti_homog.homogenization.energy_release import TipZones  # bonded cells have no tips
+
+        zones = TipZones(cell)
+        singular = zones.singular(responses[0])
     for stress, sides in _recovered(cell, responses, lattice):
-        energy, of_each = stress.difference()
-        sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides)
+        places = stress.points[stress.triangles[:, :3]].mean(axis=1), sides.points[:, [0, -1]].mean(axis=1)
+        weights = [zones.weights(x, *singular) if zones and singular else np.ones(len(x)) for x in places]
+        energy, of_each = stress.difference(weights[0])
+        sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides, weights[1])
         shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = distributed_arrays.allreduce_sum(cell.comm, sums) / area
+    if zones and singular:
+        elements = elements + zones.energy_changes(*singular, responses, grows=True).sum(axis=0) / area
     if cell.case.interfaces and not cell.summary.across:
         lam = np.stack([response.solution.lam for response in responses], axis=1)
         state = responses[0].state

@@ -20,16 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case import Case, cell_section, material_sections
-from feti_homog.fem import CONDUCTION, Problem, assembly, shape_functions
+from feti_homog.fem import CONDUCTION, assembly, shape_functions
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import ROUNDING, CellSummary
 from feti_homog.homogenization.recovered_fields import with_displacements
-from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import material_derivatives
 from feti_homog.system.parallel import distributed_arrays
-from feti_homog.typing import Float, Int32
+from feti_homog.typing import Float
 
 IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
@@ -114,10 +113,11 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
             nodes = s.mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
-            fields = _Fields.of(s, nodes, u[s.mesh.node_class[nodes]], loads[:m])
-            sums[material_sections.provider(s.submesh.phase, cell.case.materials)] += fields.products()
+            of_nodes = s.mesh.points[nodes], u[s.mesh.node_class[nodes]]
+            fields = shape_functions.ElementFields.of(problem, *of_nodes, s.L, loads[:m], s.is_mixed)
+            sums[material_sections.provider(s.submesh.phase, cell.case.materials)] += _products(fields)
             if V is not None:
-                growth += fields.change(problem, s.L, V[nodes], loads[m:])
+                growth += fields.change(s.L, loads[m:], V[nodes])
     grams = {
         name: (T.T @ distributed_arrays.allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k)
         for name, gram in sums.items()
@@ -125,77 +125,15 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     return grams, distributed_arrays.allreduce_sum(cell.comm, growth)
 
 
-@dataclass(frozen=True)
-class _Fields:
-    """The fields in e elements at q points under k loads.
-
-    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
-    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
-
-    Attributes:
-        gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
-        slopes: (e, q, 2, c, k) du_i / dx_d.
-        strain: (e, q, m, k) with the loads.
-        rest: (e, q, k) r; None unless the elements are mixed.
-    """
-
-    gradients: Float
-    weights: Float
-    slopes: Float
-    strain: Float
-    rest: Float | None
-
-    @classmethod
-    def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Compute the fields in elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
-        points, (_, a, c, k) = s.mesh.points[nodes], u.shape
-        elements = shape_functions.MixedElements.of(points, s.L) if s.is_mixed else None
-        g, w = shape_functions.gradients(points) if elements is None else (elements.gradients, elements.weights)
-        u = u if elements is None else elements.with_bubble(u)
-        slopes = g.transpose(0, 1, 3, 2).reshape(len(g), -1, g.shape[2]) @ u.reshape(*u.shape[:2], -1)
-        slopes = slopes.reshape(*w.shape, 2, c, k)
-        strain = _strains(slopes, s.problem)
-        rest = None if elements is None else strain[:, :, 0] + strain[:, :, 1] - elements.dilatation(u)
-        return cls(g[:, :, :a], w, slopes, strain + loads, rest)
-
-    def products(self) -> Float:
-        """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1], less r^2 / 2 in products of 11 and 22."""
-        *points, _, k = self.strain.shape
-        gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
-        if self.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22
-            change = _gram(self.rest, self.weights) / 2
-            gram[:k, k : 2 * k] -= change
-            gram[k : 2 * k, :k] -= change
-        return gram
-
-    def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
-        """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V.
-
-        At fixed displacements the derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with
-        d grad u = -grad V grad u.  V is (e, a, 2), and `more` (v - m, k) has the loads after the m strains.
-        """
-        (e, q, _, c, k), m = self.slopes.shape, problem.strains
-        grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
-        div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
-        moved = -grad_V @ self.slopes.reshape(e, q, 2, c * k)
-        moved = _strains(moved.reshape(self.slopes.shape), problem)
-        strain = np.concatenate([self.strain, np.broadcast_to(more, (e, q, *more.shape))], axis=2)
-        work = self.weights[..., None, None] * (A @ strain)
-        half = div_V / 2 * strain
-        half[:, :, :m] += moved
-        change = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
-        if self.rest is not None:
-            half = moved[:, :, 0] + moved[:, :, 1] + div_V[..., 0] / 2 * self.rest
-            change -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
-        return np.asarray(change + change.T)
-
-
-def _strains(slopes: Float, problem: Problem) -> Float:
-    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
-    strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
-    for (i, d), number in np.ndenumerate(problem.voigt):
-        strain[:, :, number] += slopes[:, :, d, i]
-    return strain
+def _products(fields: shape_functions.ElementFields) -> Float:
+    """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1], less r^2 / 2 in products of 11 and 22."""
+    *points, _, k = fields.strain.shape
+    gram = _gram(np.concatenate([fields.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), fields.weights)
+    if fields.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22
+        change = _gram(fields.rest, fields.weights) / 2
+        gram[:k, k : 2 * k] -= change
+        gram[k : 2 * k, :k] -= change
+    return gram
 
 
 def _gram(fields: Float, weights: Float) -> Float:

@@ -79,7 +79,7 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the energy release rates (2,) in opening and in shear, at least 0.
+    """Return the energy release rates (c,) of c components, opening and shear or axial shear, at least 0.
 
     Irwin's integral for closing the end of a crack, over the closed length a, is the work per length
 
@@ -89,11 +89,11 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 
     Args:
         length: closed length a.
-        before, force: (j,) distances s of bonded nodes from the tip, the tip first, and forces (j, 2) on these nodes.
-        behind, jump: (k,) rising distances of nodes behind the tip, the tip first, and jumps (k, 2) at these nodes.
+        before, force: (j,) distances s of bonded nodes from the tip, the tip first, and forces (j, c) on these nodes.
+        behind, jump: (k,) rising distances of nodes behind the tip, the tip first, and jumps (k, c) at these nodes.
     """
     within = before < length
-    w = np.stack([np.interp(length - before[within], behind, jump[:, mode]) for mode in (0, 1)], axis=1)
+    w = np.stack([np.interp(length - before[within], behind, component) for component in jump.T], axis=1)
     return np.asarray(np.maximum((force[within] * w).sum(axis=0), 0.0) / (2 * length))
 
 

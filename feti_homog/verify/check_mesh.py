@@ -28,7 +28,6 @@ WITHOUT_BUBBLE = 1.7
 # Least ratio of an energy error to the sum of the element errors, which may cancel at arcs.
 LEAST_SHARE = 0.05
 MODE_LENGTH = 1e-3  # least length at which modes are evaluated / radius
-LOADS = [sign + name for sign in ("", "-") for name in (*NAMES[3][0], "strain")]  # loads of release rates, by name
 # Middles of sides in barycentric coordinates: a quadrature rule, exact for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
@@ -197,15 +196,16 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check release rates G = G_I + G_II, modes psi with tan^2 psi = G_II / G_I, and places and lengths of tips."""
+    """Check rates G = G_I + G_II + G_III, tan^2 psi = (G_II + G_III) / G_I, and places and lengths of tips."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
-    names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre", "load"
-    G, first, second, psi, length, angle, number, load = (np.array(tips[name]) for name in names)
-    pair, turn = np.array(tips.get("interface", np.ones(len(G)))), np.radians(psi)
-    tips.leaves_open("G", "G_I", "G_II")
-    findings.compare("rates", G, first + second, np.abs(G), at)
-    findings.compare("rates", first * np.sin(turn) ** 2, second * np.cos(turn) ** 2, np.abs(G), at)
-    findings.record("rates", np.where(np.isin(load, LOADS), 0.0, np.inf), at)
+    names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre"
+    G, opening, shear, psi, length, angle, number = (np.array(tips[name]) for name in names)
+    pair, third = (np.array(tips.get(name, [k] * len(G))) for name, k in (("interface", 1), ("G_III", 0.0)))
+    loads = [*NAMES[6 if "G_III" in tips else 3][0], "strain"]
+    tips.leaves_open("G", "G_I", "G_II", "G_III")
+    findings.compare("rates", G, opening + shear + third, np.abs(G), at)
+    findings.compare("rates", shear + third, G * np.sin(np.radians(psi)) ** 2, np.abs(G), at)
+    findings.record("rates", [0.0 if load.lstrip("-") in loads else np.inf for load in tips["load"]], at)
     radii = np.hypot(*from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.shift).T)
     for t in range(len(G)):
         on_curve = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)

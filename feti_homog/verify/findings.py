@@ -186,7 +186,7 @@ REASONS = {
     "closed formulas, which no field can confirm": ("estimates", "fibre_bounds", "maxwell"),
     "estimates of the mesh error, except for energies": ("mesh_error",),
     "derivatives under contact or with a temperature, except for energies": ("derivatives",),
-    "energies that breaks at tips would release, except for their modes": ("G", "G_I", "G_II"),
+    "energies that breaks at tips would release, except for their modes": ("G", "G_I", "G_II", "G_III"),
     "numbers of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
     "copies of other numbers, for readers": (
         "fibres", "peak", "mark", "debonding_angle", "dissipation_ratio", "parameter_values",

@@ -26,7 +26,7 @@ ENERGIES = {
     "stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
     "friction_heat",
 }  # fmt: skip
-RATES = {"G", "G_I", "G_II"}
+RATES = {"G", "G_I", "G_II", "G_III"}
 STRESSES = {"principal", "von_mises", "hydrostatic"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "softened", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
@@ -130,7 +130,7 @@ def _certainty(record: str, name: str, base: Kinds, sizes: Mapping[str, float]) 
     """Weight the modes of tips by their rates: a mode is a ratio of rates."""
     if name != "psi" or f"{record}.G_I" not in base:
         return 1.0
-    rates = _flat(base[f"{record}.G_I"]) + _flat(base[f"{record}.G_II"])
+    rates = sum(_flat(base[f"{record}.{mode}"]) for mode in ("G_I", "G_II", "G_III") if f"{record}.{mode}" in base)
     return np.minimum(np.abs(rates) / (LEAST_RATE * sizes[group(f"{record}.G_I")] or 1.0), 1.0)
 
 

@@ -87,11 +87,23 @@ def test_so_it_is_on_other_meshes_and_of_other_phases(comm, case, error):
 
 
 @pytest.mark.parametrize("strain", [[-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
-def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain):
-    tips, expected = rates(comm, strain, 120.0, SPRINGS, tip_size=2e-4)
+def test_so_it_is_with_elastic_bonds(comm, strain):
+    tips, expected = rates(comm, strain, 120.0, SPRINGS, mesh_size=0.02)
     parallel_assert(comm, abs(tips.G.sum() / expected - 1) < 5e-3)
     if strain == [-1.0, 0.0, 0.0]:
         parallel_assert(comm, bool((tips.G_I == 0.0).all() and (tips.psi == 90.0).all()))
+
+
+@pytest.mark.parametrize(
+    ("bond", "reference"), [(SPRINGS, SPRINGS), ({name: 2000 * k for name, k in SPRINGS.items()}, FREE)]
+)
+def test_elastic_bonds_need_no_fine_elements_at_tips(comm, bond, reference):
+    """The stress in stiff bonds, whose rates are the rates of rigid bonds, rises over less than an element."""
+    strain = [1.0, 0.2, 0.3]
+    (fine,), _ = solved(comm, strain, [120.0], reference, tip_size=2e-4)
+    for cell, error in (({"mesh_size": 0.05}, 2e-3), ({"mesh_size": 0.05, "order": 1}, 2e-2)):
+        (point,), _ = solved(comm, strain, [120.0], bond, **cell)
+        parallel_assert(comm, np.abs(point.tips.G / fine.tips.G - 1).max() < error, str(point.tips.G / fine.tips.G))
 
 
 def test_modes_do_not_depend_on_the_mesh(comm):

@@ -27,9 +27,8 @@ ONSET = {
     "axial": Column("axial", 10, ".4g"),
     "psi": Column("psi", 10, ".4g"),
 }
-RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
-         Column("angle", 9))  # fmt: skip
-SECTION = Column("interface", 11, "d")  # for cases with several sections
+RATES = (*(Column(name) for name in ("G", "G_I", "G_II", "G_III")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
+         Column("angle", 9), Column("interface", 11, "d"))  # fmt: skip
 LAST_STRAIN = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
 TIP_TITLE = "Largest energy release rate"
 
@@ -155,7 +154,7 @@ def angle_tip_table(document: Document) -> list[Table]:
 def _largest(tips: Document | None) -> dict[str, Document]:
     """Return the tip with the largest G for each load, in load order; {} without tips."""
     best: dict[str, Document] = {}
-    names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
+    names = ["load", *(column.name for column in RATES if column.name in (tips or ()))]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():
         tip = dict(zip(names, values, strict=True))
         # The first tip wins where several differ only by rounding.
@@ -165,8 +164,8 @@ def _largest(tips: Document | None) -> dict[str, Document]:
 
 
 def _rate_columns(tips: Mapping[str, Document]) -> list[Column]:
-    rate_columns = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
-    return [*rate_columns, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
+    columns = [column for column in RATES if any(column.name in tip for tip in tips.values())]
+    return [replace(column, name="at") if column.name == "angle" else column for column in columns]
 
 
 TABLES: dict[str, Callable[[Document, int | None], list[Table]]] = {

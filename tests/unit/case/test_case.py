@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.base_case import AXIAL, BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, SPATIAL, TRANSVERSE, changed, fibre
+from support.base_case import BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, SPATIAL, changed, fibre
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, FAULTY_COHESIVE_LAWS, PATH, SOFTENING, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES, FAULTY_SIZES, FAULTY_TABLE_CELLS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
@@ -216,44 +216,6 @@ def test_high_contrast_is_warned_of(tmp_path, plane):
     (warning,) = case_of(tmp_path, case).warnings()
     assert warning.startswith("[material.fibre], [material.matrix]: stiffnesses differ by ")
     assert case_of(tmp_path, case.replace("1e13", "1e11")).warnings() == ()
-
-
-def test_strengths_above_a_stiffness_are_warned_of():
-    """E / (1 - nu^2) of plane stress is 3.2: a matrix in GPa, strengths in MPa."""
-    asked = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-        "material": {"matrix": {"young": 3.0, "poisson": 0.25}, "fibre": {"young": 7e4, "poisson": 0.2}},
-        "analysis": {"type": "path", "plane": "stress"},
-        "path": {"waypoints": [{"E11": 0.01}]},
-        "interface": {"normal_strength": 60.0, "tangential_strength": 3.1},
-    }
-    asked["material"]["fibre"]["strength"] = {"principal": 3.3}
-    end = "above 3.2, the stiffness of a phase: are both in one unit?"
-    expected = (f"[interface] normal_strength = 60: {end}", f"[material.fibre.strength] principal = 3.3: {end}")
-    assert parse(asked, Path()).warnings() == expected
-
-
-@pytest.mark.parametrize(
-    ("matrix", "young", "is_alike"),
-    [(3500.0, 231.0, False), (3.5, 231e3, False), (3.5, 231.0, True), (3.5, 3.5, True), (3.5, 3500.0, True)],
-)
-def test_moduli_in_unlike_units_are_remarked(tmp_path, matrix, young, is_alike):
-    remarks = case_of(tmp_path, changed(("88.0", str(matrix)), ("200.0", str(young)))).remarks()
-    line = f"[material.fibre] modulus {young:g}, [material.matrix] {matrix:g}: are both in one unit?"
-    assert remarks == (() if is_alike else (line,))
-    assert case_of(tmp_path, fibre(TRANSVERSE + AXIAL)).remarks() == ()  # only across the fibres it is softer
-
-
-@pytest.mark.parametrize("name", ["E_transverse", "G_axial"])
-def test_moduli_of_one_phase_in_unlike_units_are_remarked(name):
-    fibre = {"E_axial": 230e3, "E_transverse": 15e3, "nu_axial": 0.2, "nu_transverse": 0.3, "G_axial": 15e3}
-    asked = {
-        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.6},
-        "material": {"matrix": {"young": 3500.0, "poisson": 0.35}, "fibre": fibre | {name: 15.0}},
-        "analysis": {"type": "stiffness", "plane": "generalized"},
-    }
-    line = f"[material.fibre] E_axial 230000, {name} 15: are both in one unit?"
-    assert [remark for remark in parse(asked, Path()).remarks() if "unit" in remark] == [line]
 
 
 def test_keys_of_friction_without_friction_are_warned_of():

@@ -34,8 +34,23 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
 @pytest.mark.parametrize(("boundary", "bound"), [("displacement", "an upper"), ("traction", "a lower")])
 def test_conditions_on_sides_bound_the_result(boundary, bound):
     """Given displacements leave less freedom than periodic ones, tractions more."""
-    (line,) = case_remarks(SimpleNamespace(cell=SimpleNamespace(boundary=boundary)))
+    cell, analysis = SimpleNamespace(boundary=boundary), SimpleNamespace(plane="strain")
+    (line,) = case_remarks(SimpleNamespace(cell=cell, materials={}, analysis=analysis))
     assert line == f'[cell] boundary = "{boundary}": the result is {bound} bound of the effective one'
+
+
+def test_an_expansion_of_some_phases_gives_no_thermal_expansion():
+    """Without any, nobody expects one; in plane strain no temperature is a load."""
+    content = tomllib.loads(VALID_CASES["base"]) | {"analysis": {"type": "stiffness", "plane": "generalized"}}
+    assert not case_remarks(Case.parse(content))
+    for phase, other in (("matrix", "fibre"), ("fibre", "matrix")):
+        materials = content["material"] | {phase: content["material"][phase] | {"expansion": 6e-5}}
+        line = f"[material.{other}] expansion: missing; without it the cell has no thermal expansion"
+        assert case_remarks(Case.parse(content | {"material": materials})) == (line,)
+        plane = {"analysis": {"type": "stiffness", "plane": "strain"}}
+        assert not case_remarks(Case.parse(content | {"material": materials} | plane))
+    zero = {name: phase | {"expansion": 0.0} for name, phase in content["material"].items()}
+    assert not case_remarks(Case.parse(content | {"material": zero}))
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -51,6 +51,8 @@ FALSE = {
         "spatial springs", document("angle", 1, "thermal_stress", 0), {"tables"},
     ),
     "a thermal stress under minus one": ("spatial contact", document("thermal_stress_compression", 1), {"tables"}),
+    "an axial rate of a tip": ("spatial contact", document("tips", "G_III", 8), {"rates"}),
+    "a load of a tip": ("spatial contact", document("tips", "load", 8, to="S13"), {"rates"}),
     "a thermal expansion": ("spatial", document("thermal_expansion", 0), {"compliance"}),
     "a constant of space": ("spatial", document("constants", "nu13"), {"moduli"}),
     "a constant about the fibres": ("spatial", document("transversely_isotropic", "G_axial"), {"moduli"}),

@@ -259,6 +259,13 @@ def test_the_largest_energy_release_rate_of_each_load_is_reported() -> None:
     assert "energy release" not in summary(bonding(tips=tips_of())) and "energy release" not in summary(bonding())
 
 
+def test_rates_along_the_fibres_have_a_column() -> None:
+    tips = tips_of(("E33", 3.0, 1, 60.0), ("gamma13", 6.0, 12, -60.0)) | {"G_III": [0.0, 5.5]}
+    text = summary(bonding(tips=tips))
+    assert line(text, "gamma13 ").split() == ["gamma13", "6", "2", "4", "5.5", "54.7", "12", "-60"]
+    assert max(map(len, text.splitlines())) <= 100
+
+
 def test_energy_release_rates_against_the_angle() -> None:
     states = {"bonded": 5, "open": 3, "closed": 1, "iterations": 4}
     stiff = {"stiffness": DOCUMENT["effective_stiffness"]} | states
