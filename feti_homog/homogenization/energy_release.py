@@ -86,7 +86,7 @@ class TipZones:
     """
 
     def __init__(self, cell: TornCell) -> None:
-        """Gather the interface nodes, and find the boundaries that limit self.  Collective."""
+        """Gather the interface nodes, and find the boundaries that limit zones.  Collective."""
         nodes = cell.solver.jump_operator.nodes
         self.cell, self.period = cell, cell.summary.shift
         self.chains = debonded_arcs.InterfaceChains(cell.neighbours.adjacency)
