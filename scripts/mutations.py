@@ -4,6 +4,7 @@
 of the words, or all. It ends with 1 if an error survives, or if tests fail without an error.
 """
 
+import argparse
 import os
 import re
 import shlex
@@ -99,4 +100,6 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("word", nargs="*", help="try only errors whose printed line has one of the words")
+    sys.exit(main(parser.parse_args().word))
