@@ -39,8 +39,7 @@ def events(
             points = engine(cell, law, waypoints, leg, begin).points()
         for point in points:
             yield point
-            if not point.state.converged:
-                # The next break cannot follow from a wrong state.
+            if not point.state.converged:  # the next break cannot follow from a wrong state
                 return
             begin = point.after
 
