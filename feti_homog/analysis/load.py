@@ -7,6 +7,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
+from feti_homog.materials import voigt
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -27,6 +28,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     strains = zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True)
     only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:
-        point["tips"] = tip_rates(context, responses[:1], ["strain"])
+        is_strain = not any(map(target.get, voigt.SPATIAL_STRESSES))
+        point["tips"] = tip_rates(context, responses[:1], ["strain" if is_strain else "load"])
     rates = load_sensitivities(context, load, responses) if context.case.output.sensitivities else {}
     return {"load": LoadPoint(**point)} | rates

@@ -75,8 +75,8 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "load: a unit strain `E11`, `E22` or `gamma12`, minus a unit strain `-E11`, ..., or the given strain `strain`; "
-        "other loads have no rates"
+        "load: a unit strain `E11`, `E22` or `gamma12`, minus a unit strain `-E11`, ..., the given strain `strain`, or "
+        "`load` with given stresses; other loads have no rates"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")

@@ -16,8 +16,8 @@ from feti_homog.interface.path import path_points
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
 
-# Loads under which tips have energy release rates; "strain" is a prescribed strain.
-IN_PLANE_LOADS = (*voigt.STRAINS, "strain")
+# Loads under which tips have energy release rates; "strain" is a prescribed strain, "load" has stresses.
+IN_PLANE_LOADS = (*voigt.STRAINS, "strain", "load")
 # Decimals of directions in sorts: rounding differs from rank to rank, and must not change the order.
 DIRECTION_DIGITS = 9
 
