@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import load_sections
 from feti_homog.materials import voigt
 from feti_homog.results import path_curves
 from feti_homog.typing import Float
@@ -54,10 +53,10 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
     On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
-    points, component = path_curves.leading_points(document), path_curves.leading_component(document)
-    before = len(path_curves.leading_points(document, ("broke", "softened")))
     leg, damaging = path_curves.legs_of(document), path_curves.damaging_leg(document, ("broke", "softened"))
-    start = 0 if damaging is None else int((leg < damaging).sum())
+    start, before = int((leg < (damaging or 0)).sum()), int((leg <= (damaging or np.inf)).sum())
+    points = document["path"][: int((leg <= (path_curves.damaging_leg(document) or np.inf)).sum())]
+    component = path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
     strain = np.array([point["strain"][component] for point in points], float) + 0.0
     stresses = path_curves.stresses(document)[: len(points)]
@@ -103,18 +102,12 @@ def bond_of(peak: path_curves.Document, title: str = "") -> str:
     return f"fibre {peak[f'{title}fibre']} at {round(peak[f'{title}angle'], 3) + 0.0:.4g} degrees"
 
 
-def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
-    """Return the stress at each path point, in the component of the peak."""
-    component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
-    return [float(stress) for stress in path_curves.stresses(document)[:, component]]
-
-
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
     """Return the larger relative fall of the stress after the peak: to the valley or leg end.  It is at least 0."""
     if "event" not in peak:
         return 0.0
     leg = path_curves.legs_of(document)
-    last = stresses_of(document, peak)[np.flatnonzero(leg == leg[peak["event"]])[-1]]
+    last = path_curves.table_of(document["path"])[peak["stress_name"]][leg == leg[peak["event"]]][-1]
     remaining = (last, peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
@@ -136,13 +129,12 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
     component = voigt.voigt_names(len(points[0]["stress"]))[0].index(peak["strain_name"])
     means = {peak[f"{name}_name"]: [point[name][component] for point in points] for name in ("stress", "strain")}
     before = ", before the largest stress of the path, which" if "event" in peak else "; the path"
-    heat = load_sections.TEMPERATURE
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
         if k and numbers[k - 1] <= peak.get("event", numbers[-1]):
             is_thermal = path_curves.temperature_of(document, numbers[k - 1]) is not None
-            axes = {heat: [point[heat] for point in points]} if is_thermal else means
+            axes = {"temperature": [point["temperature"] for point in points]} if is_thermal else means
             ends = slice(k - 1, k + 1)
             places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *mean][ends]):.4g}" for name, mean in axes.items()]
             lines.append(

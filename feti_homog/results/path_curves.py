@@ -95,26 +95,19 @@ def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int 
     return next((int(number) for number in leg[damaged & under_stress]), None)
 
 
-def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the leg where damage, as `counts`, begins under stress, or all points."""
-    leg, damaging = legs_of(document), damaging_leg(document, counts)
-    return [*document["path"][: len(leg) if damaging is None else int((leg <= damaging).sum())]]
-
-
 def abscissa(document: Document) -> tuple[str, Float]:
     """Return the name and values (n,) of the leading strain; of the temperature if all waypoints change it alone."""
-    if changed_components(document) or not all("temperature" in point for point in document["path"]):
-        component = leading_component(document)
-        name = voigt.voigt_names(len(document["path"][0]["strain"]))[0][component]
-        return name, np.array([point["strain"][component] for point in document["path"]], float)
-    return load_sections.TEMPERATURE, np.array([point["temperature"] for point in document["path"]], float)
+    points, name = document["path"], load_sections.TEMPERATURE
+    if changed_components(document) or name not in points[0]:
+        name = voigt.voigt_names(len(points[0]["strain"]))[0][leading_component(document)]
+    return name, table_of(points)[name]
 
 
 def temperature_of(document: Document, number: int) -> float | None:
     """Return the temperature of point `number` on a leg that changes it alone, else None."""
-    temperature = document["path"][number].get("temperature")
-    changes_more = temperature is not None and changed_components(document, int(legs_of(document)[number]))
-    return None if changes_more else temperature
+    point = document["path"][number]
+    is_alone = "temperature" in point and not changed_components(document, int(legs_of(document)[number]))
+    return point["temperature"] if is_alone else None
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
@@ -269,8 +262,7 @@ def rising_strain(document: Document) -> Float | None:
     if is_proportional(document):
         curve = load_controlled(points)
     else:
-        values = np.array([[*point["stress"], *point["strain"]] for point in points])
-        curve = np.vstack([np.zeros(values.shape[1]), values])
+        curve = np.array([np.append(0.0, values) for values in table_of(points).values()]).T
     count = curve.shape[1] // 2
     stress, strain = curve[:, :count], curve[:, count + leading_component(document)]
     strain = strain * np.sign(strain[-1])

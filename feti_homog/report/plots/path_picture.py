@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.spatial.distance import cdist
 
-from feti_homog.case import load_sections
 from feti_homog.materials import voigt
 from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
@@ -41,21 +40,18 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     points, case = document["path"], document["case"]
     axis, strain = path_curves.abscissa(document)
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
-    warms = axis != load_sections.TEMPERATURE and any(point.get("temperature") for point in points)
+    warms = axis != "temperature" and any(point.get("temperature") for point in points)
     picture = look.figure(7.2, 7.2 + 1.6 * warms)
     narrow = picture.get_figwidth() < plot_helpers.NARROW
     upper, *middle, lower = picture.subplots(2 + warms, 1, sharex=True, height_ratios=(2.2, *[1] * warms, 1))
     has_stress = _main_curves(upper, document, axis, style)
     upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}" if has_stress else "macroscopic strain")
-    words = "change of temperature" if axis == load_sections.TEMPERATURE else "macroscopic strain"
-    lower.set_xlabel(f"{words} ${plot_helpers.SYMBOLS[axis]}$")
+    lower.set_xlabel(_axis_label(axis))
     title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
     upper.set_title("\n".join(filter(None, (title, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
         way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
-        axes.plot(
-            *(np.append(0.0, way[name]) for name in (axis, load_sections.TEMPERATURE)), color="0.3", lw=1.2, **style
-        )
+        axes.plot(*(np.append(0.0, way[name]) for name in (axis, "temperature")), color="0.3", lw=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
     _count_curves(lower, document, strain, style)
     lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
@@ -75,17 +71,9 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
         bond = "" if narrow else landmarks.bond_of(peak, titles[-1]).replace(" degrees", "°")
         stress, temperature = peak[f"{titles[-1]}stress"], path_curves.temperature_of(document, event)
         label = " and ".join(names) + (f" {stress:.4g} {unit}".rstrip() if stress or temperature is None else "")
-        label += (
-            "" if temperature is None else f" at ${plot_helpers.SYMBOLS[load_sections.TEMPERATURE]}={temperature:.4g}$"
-        )
-        upper.plot(
-            *curve[event],
-            mark := MARKS[titles[-1]],
-            ms=13 if mark == "*" else 7,
-            zorder=6,
-            **star,
-            label=f"{label}\n{bond}".rstrip(),
-        )
+        label += "" if temperature is None else rf" at $\Delta{{T}}={temperature:.4g}$"
+        label = f"{label}\n{bond}".rstrip()
+        upper.plot(*curve[event], mark := MARKS[titles[-1]], ms=13 if mark == "*" else 7, zorder=6, **star, label=label)
     upper.margins(y=0.12)  # room for numbers
     for axes in (upper, *middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
@@ -95,6 +83,12 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     plot_helpers.finish_curves(upper, *middle, lower)
     _number_points(upper, curve, numbers)
     return picture
+
+
+def _axis_label(axis: str) -> str:
+    return (
+        f"{'change of temperature' if axis == 'temperature' else 'macroscopic strain'} ${plot_helpers.SYMBOLS[axis]}$"
+    )
 
 
 def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, Any]) -> bool:
@@ -210,9 +204,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     parts = {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
     place, words = curves["load_factor"] * legs, "leg of the path"
     if legs == 1:
-        place, name = curves["axis"], path_curves.abscissa(document)[0]
-        words = f"{'change of temperature' if name == load_sections.TEMPERATURE else 'macroscopic strain'}"
-        words += f" ${plot_helpers.SYMBOLS[name]}$"
+        place, words = curves["axis"], _axis_label(path_curves.abscissa(document)[0])
     picture = look.figure(7.2, 4.6)
     axes = picture.subplots()
     axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
@@ -254,9 +246,7 @@ def _energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> d
     position = load[1:] * legs
     is_ray = by_events & (position <= 1.0 + path_curves.SAME_LOAD) & (legs == 1 or not heat.any())
     start = np.where(is_ray, load[:-1] / load[1:], 0.0)
-    given = np.array(
-        [not any(map(target.get, (*names, load_sections.TEMPERATURE))) for target in path_curves.targets(document)]
-    )
+    given = np.array([not any(map(target.get, (*names, "temperature"))) for target in path_curves.targets(document)])
     by_stress = broken & given[np.ceil(position - path_curves.SAME_LOAD).clip(1).astype(int) - 1]
     begin = np.where(is_ray, work[1:] - stored[1:] * (1.0 - start**2), work[:-1] + 2.0 * by_stress * np.diff(lost))
     dE, dT, C = np.diff(E, axis=0), np.diff(T), (2.0 * stored - (S * E).sum(axis=1)) / np.where(T == 0.0, np.inf, T)

@@ -64,7 +64,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     text = f"{text}: {_landmark(document, peak, '')}" if "event" in peak else no_peak
     for title in ("first_softening_", "first_break_"):
         text += f"; {title.replace('_', ' ')}{_landmark(document, peak, title)}" if f"{title}event" in peak else ""
-    stresses = landmarks.stresses_of(document, peak)
+    stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
@@ -79,11 +79,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
     text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
-    strains, stresses_of_path = voigt.voigt_names(len(document["path"][0]["stress"]))
+    strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     for leg, k, number in path_curves.largest_of_legs(document):
         strain, stress = document["path"][number]["strain"][k], path_curves.stresses(document)[number, k]
         if strains[k] != peak["strain_name"] and stress:
-            name, at = stresses_of_path[k] + stress_label(document), _load_at(document, number, strains[k], strain)
+            name, at = stress_names[k] + stress_label(document), _load_at(document, number, strains[k], strain)
             lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {at} (point {number})")
     if path_curves.scales_with_toughness(document) and path_curves.legs(document) == 1:
         lines.append("Scaling: strains and stresses of the path grow with the root of the toughness")
