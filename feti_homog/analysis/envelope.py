@@ -65,6 +65,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     finder = _Finder(context, responses, law, onsets.Onset.of(law, context.loads.interfaces, bonds))
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
+    if points[0].factor == 0.0:
+        change = f"[envelope] temperature = {section.temperature:g}"
+        context.notes.append(
+            f"{change}: it breaks bonds alone, so that all loads at onset are 0; expected a smaller one"
+        )
     secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
     secants |= constants(context.cell, secants)
     return {"envelope": points} | secants | mesh_error(context, secants, errors, [])

@@ -7,6 +7,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
 from feti_homog.analysis.tip_records import tip_rates
+from feti_homog.materials import voigt
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -25,6 +26,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     context.states.record({"load": responses}, 1.0, 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
     if context.case.interface is not None:
-        point["tips"] = tip_rates(context, {"strain": responses})
+        is_strain = not any(map(target.get, voigt.SPATIAL_STRESSES))
+        point["tips"] = tip_rates(context, {"strain" if is_strain else "load": responses})
     rates = load_sensitivities(context, load, responses) if context.case.output.sensitivities else {}
     return {"load": LoadPoint(**point)} | rates

@@ -232,6 +232,8 @@ def _completed(
             f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
             "and the path follows one of them, which depends on the order of nodes"
         )
+    if context.case.has_friction and not any(entry["open"] or entry["closed"] for entry in entries):
+        context.notes.append("[interface] friction: without effect, for no face is debonded and no bond breaks")
     for number, mark in marks.items():
         entries[number]["mark"] = mark
     peak = landmarks.peak_of(document)

@@ -75,7 +75,8 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., or the given load `strain`"
+        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., the given strain `strain`, or `load` with given "
+        "stresses"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")
@@ -189,14 +190,20 @@ class PathPoint:
 class Peak:
     """The largest stress on a path before the deepest fall of the stress.
 
-    The component is conjugate to the largest changing strain up to the end of the leg with the first damage.
+    The component is conjugate to the largest changing strain on the leg where damage begins under stress; if only the
+    temperature changes, it has the largest stress.
     """
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described("largest stress up to the deepest fall, or at any point without a fall", records.STRESS)
-    strain: float = described("macroscopic strain at the peak")
-    event: int = described("number of its point in `path`, from 0")
+    stress: float | None = described(
+        "largest stress up to the deepest fall, or at any point without a fall; absent, with its strain, event and "
+        "`dissipated`, if no stress acts",
+        records.STRESS,
+        default=None,
+    )
+    strain: float | None = described("macroscopic strain at the peak", default=None)
+    event: int | None = described("number of its point in `path`, from 0", default=None)
     first_break_stress: float | None = described("stress where the first bonds break", records.STRESS, default=None)
     first_break_strain: float | None = described("strain there", default=None)
     first_break_event: int | None = described("number of that point", default=None)
@@ -219,7 +226,9 @@ class Peak:
     so_far: bool = described(
         "true if the path ends before such a fall: not a peak, since a longer path may go higher", default=False
     )
-    dissipated: float = described("energy lost to breaks before the peak, per area of the cell", records.STRESS)
+    dissipated: float | None = described(
+        "energy lost to breaks before the peak, per area of the cell", records.STRESS, default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,34 +43,44 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 
 
 def peak_of(document: path_curves.Document) -> dict[str, Any]:
-    """Return the fields of `result_records.Peak` for a non-empty path.
+    """Return the fields of `result_records.Peak` for a non-empty path; there is no peak if no stress acts.
 
-    The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points without such a
-    fall: after all fibres debond, the matrix alone may carry a larger stress than the composite did.  Falls by less
-    than `LEAST_FALL`, and all falls of an unfinished path, count only after the largest stress.  The entry `so_far`
-    marks a path that is unfinished, or stopped early without a fall.
+    The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points from the leg on
+    where damage begins under stress: after all fibres debond, the matrix alone may carry a larger stress than the
+    composite did.  Falls by less than `LEAST_FALL` count only after the largest stress, and so do all falls of an
+    unfinished path, or after bonds broke without stress.  The entry `so_far` marks a path that is unfinished, or
+    stopped early without a fall.
 
     On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
-    points, component = path_curves.leading_points(document), path_curves.leading_component(document)
-    before = len(path_curves.leading_points(document, ("broke", "softened")))
+    leg, damaging = path_curves.legs_of(document), path_curves.damaging_leg(document, ("broke", "softened"))
+    start, before = int((leg < (damaging or 0)).sum()), int((leg <= (damaging or np.inf)).sum())
+    points = document["path"][: int((leg <= (path_curves.damaging_leg(document) or np.inf)).sum())]
+    component = path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
-    stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
+    strain = np.array([point["strain"][component] for point in points], float) + 0.0
+    stresses = path_curves.stresses(document)[: len(points)]
+    stress = stresses[:, component] + 0.0
     number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
     if path_curves.is_proportional(document):
         number = np.repeat(path_curves.rising_points(points), 2)[1:]
-        curve = path_curves.load_controlled(points)[1:, component] + 0.0
+        curve = path_curves.load_controlled(points)[1:, component]
+        curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)
     size = np.abs(curve)
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
-        size = np.clip(curve * np.sign(stress[np.abs(stress[:before]).argmax()]), 0.0, None)
+        size = np.clip(curve * np.sign(stress[start + np.abs(stress[start:before]).argmax()]), 0.0, None)
+        size[:start] = 0.0
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     breaks = [(a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
-    share = np.inf if "unfinished" in document else LEAST_FALL
+    share = np.inf if "unfinished" in document or broke[:start].any() else LEAST_FALL
     falls = [(size[a] - size[b], a, b) for a, b in breaks if a == size.argmax() or 1 - size[b] / size[a] >= share]
     _, top, valley = max(falls, default=(0.0, len(size), None))
     event = int(number[size[: top + 1].argmax()])
     names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
-    entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
+    entries: dict[str, Any] = {}
+    if has_peak := bool(stresses.any()):
+        entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
+        entries["dissipated"] = points[event].get("dissipated", 0.0)
     for title, count in (("first_softening", "softened"), ("first_break", "broke")):
         first = next((number for number, point in enumerate(points) if point.get(count)), None)
         if first is not None:
@@ -79,8 +89,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
     is_cut_off = valley is None and document["path"][-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
-    entries |= {"so_far": True} if is_cut_off or "unfinished" in document else {}
-    entries["dissipated"] = points[event].get("dissipated", 0.0)
+    entries |= {"so_far": True} if has_peak and (is_cut_off or "unfinished" in document) else {}
     # The fibres and directions of the bonds follow from the states alone.
     bonds = {name: value for name, value in document.get("peak", {}).items() if name.endswith(("fibre", "angle"))}
     return {"strain_name": names[0], "stress_name": names[1], **entries, **bonds}
@@ -93,16 +102,12 @@ def bond_of(peak: path_curves.Document, title: str = "") -> str:
     return f"fibre {peak[f'{title}fibre']} at {round(peak[f'{title}angle'], 3) + 0.0:.4g} degrees"
 
 
-def stresses_of(document: path_curves.Document, peak: path_curves.Document) -> list[float]:
-    """Return the stress at each path point, in the component of the peak."""
-    component = voigt.voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
-    return [float(point["stress"][component]) for point in document["path"]]
-
-
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
     """Return the larger relative fall of the stress after the peak: to the valley or leg end.  It is at least 0."""
+    if "event" not in peak:
+        return 0.0
     leg = path_curves.legs_of(document)
-    last = stresses_of(document, peak)[np.flatnonzero(leg == leg[peak["event"]])[-1]]
+    last = path_curves.table_of(document["path"])[peak["stress_name"]][leg == leg[peak["event"]]][-1]
     remaining = (last, peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
 
@@ -117,19 +122,24 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
     """Return a line for each phase that passes its strength up to the peak.
 
-    The lines give stress and strain.  Utilisations at the kept points `numbers` are interpolated linearly, from 0 on.
+    The lines give stress and strain, or the temperature if only this changes.  Utilisations at the kept points
+    `numbers` are interpolated linearly, from 0 on.
     """
-    lines, component = list[str](), voigt.voigt_names(len(document["path"][0]["stress"]))[0].index(peak["strain_name"])
-    means = [np.array([point[name] for point in document["path"]])[numbers, component] for name in ("stress", "strain")]
+    lines, points = list[str](), [document["path"][number] for number in numbers]
+    component = voigt.voigt_names(len(points[0]["stress"]))[0].index(peak["strain_name"])
+    means = {peak[f"{name}_name"]: [point[name][component] for point in points] for name in ("stress", "strain")}
+    before = ", before the largest stress of the path, which" if "event" in peak else "; the path"
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
-        if k and numbers[k - 1] <= peak["event"]:
-            stress, strain = (np.interp(1.0, ratios[k - 1 : k + 1], np.r_[0.0, mean][k - 1 : k + 1]) for mean in means)
-            place = f"{peak['stress_name']} = {stress:.4g}, {peak['strain_name']} = {strain:.4g}"
+        if k and numbers[k - 1] <= peak.get("event", numbers[-1]):
+            is_thermal = path_curves.temperature_of(document, numbers[k - 1]) is not None
+            axes = {"temperature": [point["temperature"] for point in points]} if is_thermal else means
+            ends = slice(k - 1, k + 1)
+            places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *mean][ends]):.4g}" for name, mean in axes.items()]
             lines.append(
-                f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {place}, before the largest "
-                "stress of the path, which takes the phase as elastic beyond"
+                f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {', '.join(places)}{before} "
+                "takes the phase as elastic beyond"
             )
     return lines
 

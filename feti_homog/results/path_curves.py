@@ -41,46 +41,84 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
     return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
 
 
-def changed_components(document: Document) -> list[int]:
-    """Return the indices of the components that the waypoints change, in Voigt order."""
+def changed_components(document: Document, leg: int | None = None) -> list[int]:
+    """Return the indices of the components that waypoint `leg`, from 1, changes; by default, that any changes."""
     pairs, matches = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
-    for target in targets(document):
+    for number, target in enumerate(targets(document), start=1):
         for component, names in enumerate(pairs):
             values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
-            matches |= {component} if values[0] != values[1] else set()
+            matches |= {component} if values[0] != values[1] and leg in (None, number) else set()
         before = target
     return sorted(matches)
 
 
-def leading_component(document: Document) -> int:
-    """Return the index of the component with the largest strain until damage begins.
+def stresses(document: Document) -> Float:
+    """Return the stresses (n, c) of the points, with zero for stresses up to `noise`."""
+    stress = np.array([point["stress"] for point in document["path"]], float)
+    return np.where(np.abs(stress) > noise(document), stress, 0.0)
 
-    The search ends with the leg on which damage begins.  It compares the components that the waypoints change, or all
-    if only the temperature changes.
+
+def noise(document: Document) -> float:
+    """Return the stress up to which stresses are noise of the solve.
+
+    It is `ZERO` times the largest stress or, if larger, the largest strain times the least modulus of the materials.
     """
-    largest = np.abs([point["strain"] for point in leading_points(document, ("broke", "softened"))]).max(axis=0)
-    changed = changed_components(document) or list(range(len(largest)))
-    return changed[int(largest[changed].argmax())]
+    strain, stress = (np.abs([point[name] for point in document["path"]]).max() for name in ("strain", "stress"))
+    named = [constant for phase in document["case"].get("material", {}).values() for constant in phase.items()]
+    moduli = [np.max(value) for name, value in named if value and name.startswith(("young", "E", "G", "stiffness"))]
+    return ZERO * float(max(stress, strain * min(moduli, default=0.0)))
 
 
-def leading_points(document: Document, counts: Sequence[str] = ("broke",)) -> list[Point]:
-    """Return the points up to the end of the first leg with damage; without damage, all points.
+def leading_component(document: Document) -> int:
+    """Return the index of the component with the largest strain on the leg where damage begins under stress.
+
+    Without such a leg, the search includes all points.  It compares the components that the waypoints change there; if
+    only the temperature changes, it compares the stresses of all components, or without stress their strains.
+    """
+    leg, damaging = legs_of(document), damaging_leg(document, ("broke", "softened"))
+    points = np.ones(len(leg), bool) if damaging is None else leg == damaging
+    strain = np.array([point["strain"] for point in document["path"]])[points]
+    if changed := changed_components(document, damaging):
+        return changed[int(np.abs(strain).max(axis=0)[changed].argmax())]
+    stress = stresses(document)[points]
+    return int(np.abs(stress if stress.any() else strain).max(axis=0).argmax())
+
+
+def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int | None:
+    """Return the first leg, from 1, with damage and stress, or None.
 
     A point has damage if one of the entries `counts`, such as `broke`, is positive.
     """
-    leg, begins = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
-    return [*document["path"][: int((leg <= leg[begins].min(initial=np.inf)).sum())]]
+    leg, damaged = legs_of(document), [any(map(point.get, counts)) for point in document["path"]]
+    under_stress = np.isin(leg, leg[stresses(document).any(axis=1)])
+    return next((int(number) for number in leg[damaged & under_stress]), None)
+
+
+def abscissa(document: Document) -> tuple[str, Float]:
+    """Return the name and values (n,) of the leading strain; of the temperature if all waypoints change it alone."""
+    points, name = document["path"], load_sections.TEMPERATURE
+    if changed_components(document) or name not in points[0]:
+        name = voigt.voigt_names(len(points[0]["strain"]))[0][leading_component(document)]
+    return name, table_of(points)[name]
+
+
+def temperature_of(document: Document, number: int) -> float | None:
+    """Return the temperature of point `number` on a leg that changes it alone, else None."""
+    point = document["path"][number]
+    is_alone = "temperature" in point and not changed_components(document, int(legs_of(document)[number]))
+    return point["temperature"] if is_alone else None
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
     """Yield leg, component with the largest strain change, and point of its largest stress, from leg 2 on."""
-    leg, changed = legs_of(document), changed_components(document)
-    strain, stress = (np.array([point[name] for point in document["path"]]) for name in ("strain", "stress"))
+    leg, stress = legs_of(document), stresses(document)
+    strain = np.array([point["strain"] for point in document["path"]])
     for number in range(2, legs(document) + 1):
         points = np.flatnonzero(leg == number)
         if len(points):
             change = np.abs(strain[points] - strain[max(points[0] - 1, 0)]).max(axis=0)
+            changed = changed_components(document, number) or changed_components(document)
             component = max(changed or range(len(change)), key=change.__getitem__)
             yield number, component, int(points[np.abs(stress[points, component]).argmax()])
 
@@ -97,10 +135,13 @@ def components_above(share: float, values: Float) -> list[int]:
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
 
-def shown_stresses(document: Document) -> list[int]:
-    """Return the components with visible stress on a path, or the leading component."""
-    matches = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
-    return matches or [leading_component(document)]
+def shown_components(document: Document) -> list[str]:
+    """Return the names of the visible stresses on a path or, without stress, of the visible strains."""
+    strains, names = voigt.voigt_names(len(document["path"][0]["stress"]))
+    if visible := components_above(FAINT, stresses(document)):
+        return [names[component] for component in visible]
+    values = np.array([point["strain"] for point in document["path"]], float)
+    return [strains[component] for component in components_above(FAINT, values)]
 
 
 def what_rises(document: Document) -> str:
@@ -136,6 +177,40 @@ def is_proportional(document: Document) -> bool:
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
+def breaks(point: Point) -> bool:
+    """Return whether bonds break or soften at a point."""
+    return bool(point["broke"] or point.get("softened"))
+
+
+def later_corners(document: Document) -> list[Point]:
+    """Return the points of an event path beyond the first leg, with a corner before each point that follows a break.
+
+    A corner has the load of the break, and the response leads straight from there to the point.  Its unprescribed
+    strains E and stresses S are NaN; if the leg changes one component alone, its conjugate follows from the work W up
+    to the point ('): W = (S + S') (E' - E) / 2, plus work of constant stresses, and under given S of the break.
+    """
+    pairs, loads, leg = voigt.plane_state_of(document).components, targets(document), legs_of(document)
+    points, corners = document["path"], list[Point]()
+    for number in range(first_leg(document), len(points)):
+        start, point = points[number - 1], points[number]
+        if breaks(start) and point["load_factor"] - start["load_factor"] > SAME_LOAD:
+            by_stress = np.array([name in loads[int(leg[number]) - 1] for _, name in pairs])
+            strain, stress = np.array(start["strain"]), np.array(start["stress"])
+            rise, work = np.array(point["strain"]) - strain, point["work"] - start["work"]
+            behind = {"strain": np.where(by_stress, np.nan, strain), "stress": np.where(by_stress, stress, np.nan)}
+            changed = changed_components(document, int(leg[number]))
+            if len(changed) == 1 and start.get("temperature") == point.get("temperature"):
+                (k,) = changed
+                work -= float((stress * rise)[by_stress].sum())
+                if not by_stress[k]:
+                    behind["stress"][k] = 2.0 * work / rise[k] - point["stress"][k]
+                elif change := point["stress"][k] - stress[k]:
+                    behind["strain"][k] = point["strain"][k] - 2.0 * work / change
+            corners.append({**start, **behind})
+        corners.append(point)
+    return corners
+
+
 def scales_with_toughness(document: Document) -> bool:
     """Return whether strains and stresses are proportional to the root of the toughness.
 
@@ -153,15 +228,22 @@ def rising_points(points: Sequence[Point]) -> Int:
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
+def table_of(points: Sequence[Point]) -> dict[str, Float]:
+    """Return the values (n,) of all stresses, all strains and the temperature by name."""
+    strains, names = voigt.voigt_names(len(points[0]["stress"]))
+    rows = [[*point["stress"], *point["strain"], point.get("temperature") or 0.0] for point in points]
+    return dict(zip((*names, *strains, load_sections.TEMPERATURE), np.array(rows, float).T, strict=True))
+
+
 def load_controlled(points: Sequence[Point]) -> Float:
-    """Return the corners (v, 2 c) of a proportional path under a rising load, stresses first.
+    """Return the corners (v, 2 c + 1) of a proportional path under a rising load: stresses, strains, temperature.
 
     Where bonds break at a load t, all bonds that cannot carry t without these bonds also break.  The cell then follows
     the next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
     and the strains likewise.  Under a prescribed strain the stress falls; under a prescribed stress the strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
-    values = np.array([[*point["stress"], *point["strain"]] for point in points])
+    values = np.array([*table_of(points).values()]).T
     reached = rising_points(points)
     corners = [np.zeros(values.shape[1]), values[reached[0]]]
     for before, after in pairwise(reached):
@@ -180,8 +262,7 @@ def rising_strain(document: Document) -> Float | None:
     if is_proportional(document):
         curve = load_controlled(points)
     else:
-        values = np.array([[*point["stress"], *point["strain"]] for point in points])
-        curve = np.vstack([np.zeros(values.shape[1]), values])
+        curve = np.array([np.append(0.0, values) for values in table_of(points).values()]).T
     count = curve.shape[1] // 2
     stress, strain = curve[:, :count], curve[:, count + leading_component(document)]
     strain = strain * np.sign(strain[-1])

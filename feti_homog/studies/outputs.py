@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.analysis import result
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.text import point_tables
-from feti_homog.results import landmarks, result_json
+from feti_homog.results import landmarks, path_curves, result_json
 from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
@@ -48,16 +48,17 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         )
         values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
     if path := document.get("path"):  # onset, end, largest stresses and peak
-        strain, stress = (point_tables.columns_without_noise([p[name] for p in path]) for name in ("strain", "stress"))
+        strain, stress = point_tables.columns_without_noise([p["strain"] for p in path]), path_curves.stresses(document)
         path = [p | {"strain": e, "stress": s} for p, e, s in zip(path, strain, stress, strict=True)]
         stresses = voigt.voigt_names(stress.shape[1])[1]
         if (onset := next((p for p in path if p["broke"] or p.get("softened")), None)) is not None:
             values |= {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
+            values |= {"onset_temperature": onset["temperature"]} if "temperature" in onset else {}
         values |= _at_point("end", path[-1]) | {name: path[-1][name] for name in ("dissipated", "work")}
         largest = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
-        values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
-        peak = landmarks.peak_of({**document, "path": path})
-        values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
+        if "event" in (peak := landmarks.peak_of({**document, "path": path})):
+            values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
+            values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
         values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
     if envelope := document.get("envelope"):  # first axis, least and largest factor
         first, second = document["case"]["envelope"]["plane"]
@@ -178,6 +179,7 @@ OUTPUT_COLUMNS = (
     Column("angle_ANGLE_Cij", records.STRESS, "entry of L^ef at an opening of ANGLE degrees"),
     Column("angle_ANGLE_Sij", records.STRESS, "macroscopic stress at an opening of ANGLE degrees"),
     Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
+    Column("onset_temperature", "temperature", "change of temperature there, in generalized plane strain"),
     Column("dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"),
     Column("work", records.STRESS, "work of the loads along a path, per area of the cell"),
     Column("onset_Sij", records.STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
@@ -186,7 +188,7 @@ OUTPUT_COLUMNS = (
         "peak_Sij",
         records.STRESS,
         "largest stress of a path in magnitude, with its sign, even if the path ends before the stress falls; for the "
-        "component whose strain leads, the stress of `peak`",
+        "component whose strain leads, the stress of `peak`; absent, with the next, if no stress acts",
     ),
     Column("peak_STRAIN", "", "strain at the peak, for the component whose strain leads"),
     Column("end_Sij", records.STRESS, "macroscopic stress at the end of a path"),

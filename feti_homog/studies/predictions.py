@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -87,6 +88,10 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     if not is_strain and target.get(load_sections.TEMPERATURE):
         end = 0.0  # a temperature may reverse the sign of the strain
     values = [datum.strain or 0.0 for datum in points]
+    sizes = np.abs([datum.strain or 0.0 for datum in points if datum.name == points[0].name])
+    turns = landmarks.turning_points(sizes, landmarks.LEAST_DROP * sizes.max())
+    falls = [f"from {sizes[a]:g} to {sizes[b]:g}" for a, b in pairwise(turns) if sizes[a] > sizes[b]]
+    yield from [f"expected strains that rise, without unloading {fall}" for fall in falls[:1]]
     if rising != points[0].strain_name:
         yield f"expected the strain that rises along the path, {rising}"
     elif any(value * end < 0 for value in values):

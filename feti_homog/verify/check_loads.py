@@ -142,7 +142,8 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
     given, v = (np.where(load.by_stress, 0.0, load.values) for load, _ in rows), len(cell.reuss)
     stresses = [cell.reuss @ cell.loads(strains[:v], float(strains[v:].sum())) for strains in given]
     largest = float(np.abs([*stresses, *(state.mean_stress for state in states)]).max(initial=0.0))
-    scales = cell.largest_strain or 1.0, largest or 1.0
+    hottest = max((abs(float(load.values[v:].sum())) for load, _ in rows), default=0.0)
+    scales = cell.largest_strain or 1.0, largest or 1.0, hottest or 1.0
     if "path" in document:
         findings.require("tables", list(document["states"]) == numbers, "states, which differ between the two files")
         in_order = [*numbers[:1], *numbers[-1:]] == [0, count - 1] and numbers == sorted({*numbers})
@@ -164,13 +165,12 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check prescribed strains and stresses relative to `scales`, and the temperature T relative to max(|T|, 1)."""
+    """Check prescribed strains and stresses, and the temperature, relative to `scales`."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
     values, by_stress = load.values[:v], load.by_stress[:v]
     findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
     findings.record("stress load", np.abs(stress - values)[by_stress] / scales[1], f"{place}, stress")
-    temperature, value = float(load.values[v:].sum()), numbers.get(TEMPERATURE, 0.0)
-    findings.compare("load", value, temperature, max(abs(temperature), 1.0), f"{place}, temperature")
+    findings.compare("load", numbers.get(TEMPERATURE, 0.0), load.values[v:].sum(), scales[2], f"{place}, temperature")
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:

@@ -142,6 +142,18 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
     parallel_assert(comm, totals[1] == pytest.approx(totals[0], rel=1e-6))
 
 
+@pytest.mark.parametrize(("load", "label"), [({"S11": 0.1}, "load"), ({"E11": 0.01, "E22": 0.0}, "strain")])
+def test_tips_name_a_load_by_what_it_gives(comm, load, label):
+    document = {
+        "cell": SQUARE | {"order": 1},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "load", "plane": "strain"},
+        "load": {"to": load},
+        "interface": {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]},
+    }
+    parallel_assert(comm, set(run(Case.parse(document), comm).load.tips.load) == {label})
+
+
 def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     """A square one, debonded on its right side."""
     write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")

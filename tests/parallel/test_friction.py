@@ -109,6 +109,33 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
 
 
 @pytest.mark.one_rank
+@pytest.mark.parametrize(("bonds", "rubs"), [({}, False), (WHOLE, True)])
+def test_friction_without_debonding_is_remarked(comm, bonds, rubs):
+    interface, path = {"friction": 0.3} | bonds, {"waypoints": [{"E11": -0.01}, {"E11": 0.01}]}
+    result = run(Case.parse(document({"mesh_size": 0.3}, EPOXY_GLASS, "strain", interface, path=path)), comm)
+    line = "[interface] friction: without effect, for no face is debonded and no bond breaks"
+    assert (line in result.remarks) is not rubs
+
+
+@pytest.mark.one_rank
+def test_a_leg_through_no_load_ends_at_its_waypoint(comm):
+    """Where the faces close at no temperature, tractions of rounding become zero, but not the rest of the way."""
+    interface = {"normal_strength": 20.0, "tangential_strength": 30.0, "friction": 0.3}
+    interface["debonded"] = [{"fibre": 1, "angle": 120.0}]
+    path = {"waypoints": [{"temperature": 79.3}, {"gamma12": 0.01}, {"gamma12": 0.0}, {"temperature": -51.7}]}
+    points = solved(
+        comm, cell={"mesh_size": 0.2}, phases=EPOXY_GLASS, plane="generalized", interface=interface, path=path
+    ).path
+    ends = [point for point in points if is_end(point, 4)]
+    assert [(p.temperature, p.strain[-1]) for p in ends] == [
+        (79.3, ends[0].strain[-1]),
+        (79.3, 0.01),
+        (79.3, 0.0),
+        (-51.7, 0.0),
+    ]
+
+
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("seed", "mesh_size"), [(0, 0.12), (5, 0.16)])
 def test_a_load_passes_through_zero(comm, seed, mesh_size):
     """Where loose fibres have lost all tractions at once, and the next leg begins from faces at all their limits."""

@@ -130,18 +130,19 @@ class CoulombLeg(Leg):
             raise
         status, x = self._on_root(faces.settled, status, self._given(start, self._x), self._x)
         change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - start
-        if change >= rest - ROUNDING:
-            change = np.inf
+        change = np.inf if change >= rest - ROUNDING else change
         tractions = (sliding.traction(state) for state in (x, x + min(rest, change) * rate))
         breaks = first_break(self.cell, self.law, sliding.bonds(self._bonds, status, x), *tractions)
         way = min(breaks, 1.0) * min(rest, change)
+        self._share = 1.0 if breaks > 1.0 and change >= rest else start + way
         after = x + way * rate
+        if self._share == 1.0:  # the given strains, without rounding
+            after[faces.loads] = np.where(self.end.by_stress, after[faces.loads], sliding.given(self.end))
         rounded = (after != 0.0) & (np.abs(after) <= ROUNDING * np.abs(x))
         after[rounded] = 0.0
         if not rounded.any():
             faces.keep(after, faces.product(x) + way * faces.product(rate))
         self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
-        self._share = 1.0 if breaks > 1.0 and change >= rest else start + way
         if breaks <= 1.0:
             yield from self._break_overloaded(is_due=True)
         elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):

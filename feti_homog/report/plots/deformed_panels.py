@@ -54,7 +54,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
         if reported(document).is_followed:
             mark_of, peak = landmarks.marks(document), landmarks.peak_of(document)
-            component = peak["stress_name"] if component == "auto" and peak["stress"] else component
+            component = peak["stress_name"] if component == "auto" and "stress" in peak else component
         component = plot_helpers.stress_component(component, states)
         stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
         colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas

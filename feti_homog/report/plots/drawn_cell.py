@@ -170,8 +170,7 @@ class LoadLabels:
         """Create the load labels from the document of a result.json."""
         analysis = reported(document)
         if analysis.is_followed:
-            largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
-            return cls(path_curves.leading_component(document), path_curves.ZERO * float(largest))
+            return cls(path_curves.leading_component(document), path_curves.noise(document))
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:

@@ -19,6 +19,7 @@ LEGIBLE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5} 
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 ROUND = (1, 2, 5, 10)  # steps of ticks
 STEPS = np.linspace(0.0, 1.0, 17)  # fractions of the way from one point to the next
+ENERGIES = ("work", "stored", "stored_in_springs", "dissipated", "fracture_energy", "friction_heat")
 # Colours of the parts of the energy.
 AREAS = {
     "stored in the bodies": "#9db8de",
@@ -31,26 +32,26 @@ AREAS = {
 
 
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw stresses and interface states against the leading strain, with the landmarks.
+    """Draw stresses, or strains without stress, and interface states against the leading strain, with the landmarks.
 
-    A panel between the two shows the change of temperature, if any.  Selected points carry their numbers.
+    A panel between the two shows the change of temperature, if any, or all panels have it as axis, if it varies alone.
+    Selected points carry their numbers.
     """
     points, case = document["path"], document["case"]
-    component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
-    strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
-    strain = strains[:, component]
+    axis, strain = path_curves.abscissa(document)
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
-    warms = any(point.get("temperature") for point in points)
+    warms = axis != "temperature" and any(point.get("temperature") for point in points)
     picture = look.figure(7.2, 7.2 + 1.6 * warms)
     narrow = picture.get_figwidth() < plot_helpers.NARROW
     upper, *middle, lower = picture.subplots(2 + warms, 1, sharex=True, height_ratios=(2.2, *[1] * warms, 1))
-    _stress_curves(upper, document, strain, components, style)
-    upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}")
-    lower.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt.voigt_names(strains.shape[1])[0][component]]}$")
+    has_stress = _main_curves(upper, document, axis, style)
+    upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}" if has_stress else "macroscopic strain")
+    lower.set_xlabel(_axis_label(axis))
     title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
     upper.set_title("\n".join(filter(None, (title, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
-        axes.plot([0.0, *strain], [0.0, *(point["temperature"] for point in points)], color="0.3", lw=1.2, **style)
+        way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
+        axes.plot(*(np.append(0.0, way[name]) for name in (axis, "temperature")), color="0.3", lw=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
     _count_curves(lower, document, strain, style)
     lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
@@ -59,17 +60,20 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
     peak = landmarks.peak_of(document)
     unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
-    curve, ink = np.stack([strain, stress[:, component]], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
+    height = path_curves.table_of(points)[peak["stress_name" if has_stress else "strain_name"]]
+    curve, ink = np.stack([strain, height], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
     largest = landmarks.name_of(document, peak)
-    largest += ", no peak yet," * (largest == landmarks.LARGEST and peak["event"] == len(points) - 1)
+    largest += ", no peak yet," * (largest == landmarks.LARGEST and peak.get("event") == len(points) - 1)
     for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
         names = [title.replace("_", " ").strip() or largest for title in titles]
         bond = "" if narrow else landmarks.bond_of(peak, titles[-1]).replace(" degrees", "°")
-        label = f"{' and '.join(names)} {peak[f'{titles[-1]}stress']:.4g} {unit}".rstrip() + f"\n{bond}".rstrip()
-        place = peak[f"{titles[-1]}strain"], peak[f"{titles[-1]}stress"]
-        upper.plot(*place, mark := MARKS[titles[-1]], ms=13 if mark == "*" else 7, zorder=6, **star, label=label)
+        stress, temperature = peak[f"{titles[-1]}stress"], path_curves.temperature_of(document, event)
+        label = " and ".join(names) + (f" {stress:.4g} {unit}".rstrip() if stress or temperature is None else "")
+        label += "" if temperature is None else rf" at $\Delta{{T}}={temperature:.4g}$"
+        label = f"{label}\n{bond}".rstrip()
+        upper.plot(*curve[event], mark := MARKS[titles[-1]], ms=13 if mark == "*" else 7, zorder=6, **star, label=label)
     upper.margins(y=0.12)  # room for numbers
     for axes in (upper, *middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
@@ -81,35 +85,44 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     return picture
 
 
-def _stress_curves(
-    axes: Axes, document: Document, strain: Array, components: Sequence[int], style: Mapping[str, Any]
-) -> None:
-    """Draw the stress curves of a path.
+def _axis_label(axis: str) -> str:
+    return (
+        f"{'change of temperature' if axis == 'temperature' else 'macroscopic strain'} ${plot_helpers.SYMBOLS[axis]}$"
+    )
+
+
+def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, Any]) -> bool:
+    """Draw stresses, or without stress strains, of a path over the quantity `axis`; return whether it has stresses.
 
     Thin lines show the first leg with its snap-back; thick lines show the response to a controlled load, on all legs.
+    On later legs lines end at a break if the state behind it is unknown.
     """
     points, first = document["path"], path_curves.first_leg(document)
-    stress = np.array([point["stress"] for point in points])
-    names = voigt.voigt_names(stress.shape[1])[1]
-    rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
-    along, drawn = stress.shape[1] + path_curves.leading_component(document), list[Array]()
+    table, shown = path_curves.table_of(points), path_curves.shown_components(document)
+    later = path_curves.table_of([*points[first - 1 : first], *path_curves.later_corners(document)])
+    corners = path_curves.load_controlled(points[:first])
+    rising = dict(zip(table, corners.T, strict=True)) if document["case"]["path"]["method"] == "events" else None
+    drawn, strains = list[Array](), voigt.voigt_names(len(points[0]["stress"]))[0]
+    inks = dict(zip((*table,), 2 * [plot_helpers.STRESS_INK[name] for name in [*table][: len(strains)]], strict=False))
     folds = rising is not None and bool((np.diff([point["load_factor"] for point in points[:first]]) < 0.0).any())
-    for i in components:
-        name, ink = plot_helpers.SYMBOLS[names[i]], plot_helpers.STRESS_INK[names[i]]
-        thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
-        line: dict[str, Any] = {"color": ink, "linewidth": 2.0, "linestyle": _line_style(stress[:, i], drawn)}
-        from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
+    for name in shown:
+        symbol, ink = plot_helpers.SYMBOLS[name], inks[name]
+        thin: dict[str, Any] = {"label": f"${symbol}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
+        line: dict[str, Any] = {"color": ink, "linewidth": 2.0, "linestyle": _line_style(table[name], drawn)}
+        from_zero = np.append(0.0, table[axis][:first]), np.append(0.0, table[name][:first])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
-            axes.plot(strain[first - 1 :], stress[first - 1 :, i], **line, marker="o", ms=3.5)
+            axes.plot(later[axis], later[name], **line)
+            axes.plot(table[axis][first:], table[name][first:], "o", color=ink, ms=3.5)
         if rising is not None:
-            axes.plot(rising[:, along], rising[:, i], **line, label=f"${name}$")
+            axes.plot(rising[axis], rising[name], **line, label=f"${symbol}$")
     if folds:
         of_some = "\nof the first leg" if first < len(points) else ""
         axes.plot([], [], color="0.3", linewidth=0.8, **style, label=f"all equilibria{of_some}")
         axes.plot([], [], color="0.3", linewidth=2.0, label=f"rising {path_curves.what_rises(document)}")
     if first < len(points):
         axes.plot([], [], color="0.3", linewidth=2.0, marker="o", ms=3.5, label="later legs")
+    return shown[0] not in strains
 
 
 def _line_style(values: Array, drawn: list[Array]) -> str:
@@ -124,18 +137,22 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
     """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
     points, drawn = document["path"], list[Array]()
     rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
+    # The bonds of an event break at the event, the bonds of an increment on the way to it.
+    by_events = document["case"]["path"]["method"] == "events"
+    way: dict[str, Any] = {"drawstyle": "steps-pre"} if by_events and rising is None else {}
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
         count = np.array([point[key] for point in points])
         line: dict[str, Any] = {"color": ink, "linestyle": _line_style(count, drawn), "label": label}
         if rising is None:
-            axes.plot(strain, count, **line, linewidth=1.4, **style)
+            axes.plot(strain, count, **line, linewidth=1.4, **way, **style)
         else:  # after a break the next branch carries the load
             axes.plot(strain, count, color=ink, linewidth=0.6, alpha=0.5)
             axes.step(strain[rising], count[rising], where="pre", **line, linewidth=1.8)
     if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
         damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]
-        axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label="damaged share × nodes")
+        label = "damaged share × nodes"
+        axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label=label, **way)
     axes.set_ylabel("interface\nnodes")
     axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
 
@@ -174,15 +191,10 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     points = document.get("path") or [{}]
     if "work" not in points[0]:
         return None
-    case, legs = document["case"], path_curves.legs(document)
-    names = ("work", "stored", "stored_in_springs", "dissipated", "fracture_energy", "friction_heat")
-    rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
-    if rising is None:  # the stack needs a position that rises
-        points = [points[k] for k in path_curves.rising_points(points)]
-    work, stored, springs, lost, fracture, heat = (_column(points, name, rising) for name in names)
-    if rising is not None:
-        lost = _column(points, "dissipated_strain_controlled", rising)
-        work = stored + lost + heat
+    case, legs, rises = document["case"], path_curves.legs(document), path_curves.is_proportional(document)
+    # The stack needs a position that rises.
+    curves = _energy_curves(document, [points[k] for k in path_curves.rising_points(points)])
+    work, stored, springs, lost, fracture, heat = (curves[name] for name in ENERGIES)
     fracture = np.minimum(fracture, lost)
     rest = "other losses in breaks" if fracture.any() else "lost in breaks"
     # The sum of the parts is the work, except for rounding.
@@ -190,12 +202,9 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     parts |= {rest: lost - fracture, "heat of friction": heat}
     threshold = path_curves.ZERO * np.abs(stored).max()
     parts = {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
-    place, words = _column(points, "load_factor", rising) * legs, "leg of the path"
+    place, words = curves["load_factor"] * legs, "leg of the path"
     if legs == 1:
-        component = path_curves.leading_component(document)
-        name = voigt.voigt_names(len(points[0]["strain"]))[0][component]
-        place = _column([point | {"leading": point["strain"][component]} for point in points], "leading", rising)
-        words = f"macroscopic strain ${plot_helpers.SYMBOLS[name]}$"
+        place, words = curves["axis"], _axis_label(path_curves.abscissa(document)[0])
     picture = look.figure(7.2, 4.6)
     axes = picture.subplots()
     axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
@@ -206,33 +215,63 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     axes.set_ylim(bottom=min(0.0, float(work.min())))
     axes.set_xlabel(words)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
-    text = "energies along the path" if rising is None else f"energies, the {path_curves.what_rises(document)} rising"
+    text = f"energies, the {path_curves.what_rises(document)} rising" if rises else "energies along the path"
     axes.set_title("\n".join(filter(None, [plot_helpers.title_of(case, text), document.get("unfinished")])))
     axes.xaxis.set_major_locator(MaxNLocator(5, steps=ROUND))
     plot_helpers.legend_below(picture, axes.get_legend_handles_labels()[0][::-1], 3)
     return picture
 
 
-def _column(points: Sequence[Mapping[str, Any]], name: str, rising: Array | None) -> Array:
-    """Return the values (n,) of an entry at n drawn positions of the path, from the unloaded cell onwards.
+def _energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+    """Return `ENERGIES`, load factor and axis (n,) at drawn positions along `points`, from the unloaded cell on.
 
-    Up to the first point, and between the points `rising` of a rising load, the response is proportional to the load:
-    elastic energies grow with its square, and losses are constant.  On other paths stresses and strains are linear
-    between points, and the elastic energies quadratic.
+    Energies are quadratic along the straight way to a point ('), on the first leg a ray through zero.  The break before
+    loses energy at one load, and has no work or, under given stresses alone, twice the loss.  The slope of the work at
+    an end is S dE + C dT, with the conjugate C of the temperature T in twice the stored energy, S E + C T; under given
+    stresses it is dS E'.
     """
-    values = np.array([float(point.get(name) or 0.0) for point in points])
-    load = np.array([point["load_factor"] for point in points])
-    power = {"load_factor": 1, "leading": 1, "work": 2, "stored": 2, "stored_in_springs": 2}.get(name, 0)
-    if rising is None:
-        rise, steps = np.diff(values)[:, None], STEPS[1:]
-        fields = [np.diff([point[field] for point in points], axis=0) for field in ("stress", "strain")]
-        bend = np.zeros((len(rise), 1)) if power < 2 else 0.5 * np.prod(fields, axis=0).sum(axis=1, keepdims=True)
-        if name == "stored_in_springs":
-            sums = [np.array(column[:-1]) + column[1:] for column in (values, [point["stored"] for point in points])]
-            bend *= (sums[0] / np.maximum(sums[1], np.finfo(float).tiny))[:, None]
-        between = values[:-1, None] + rise * steps - bend * steps * (1.0 - steps)
-        is_drawn = (steps == 1.0) | (np.diff(load)[:, None] > 0.01 * load[-1])  # points between distant loads
-        return np.concatenate([values[0] * STEPS[:-1] ** max(power, 1), values[:1], between[is_drawn]])
-    values, load = values[rising], load[rising]
-    start = np.append(0.0, load[:-1] / load[1:])
-    return np.asarray(values[:, None] * (start[:, None] + (1.0 - start[:, None]) * STEPS) ** power).ravel()
+    path, legs, axis = document["case"]["path"], path_curves.legs(document), path_curves.abscissa(document)[0]
+    table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}
+    names, (*pairs, T) = voigt.voigt_names(len(points[0]["stress"]))[0], table.values()
+    S, E = (np.array(pairs[part]).T for part in (slice(len(names)), slice(len(names), None)))
+    energy = {
+        name: np.array([0.0, *(float(p.get(name) or 0.0) for p in points)]) for name in (*ENERGIES, "load_factor")
+    }
+    work, stored, springs, lost, _, heat, load = energy.values()
+    if path_curves.is_proportional(document):
+        lost[1:] = [point["dissipated_strain_controlled"] for point in points]
+        work[:] = stored + lost + heat
+    by_events, breaks = path["method"] == "events", np.array([False, *map(path_curves.breaks, points)])
+    broken = breaks[:-1] if by_events else breaks[1:]
+    position = load[1:] * legs
+    is_ray = by_events & (position <= 1.0 + path_curves.SAME_LOAD) & (legs == 1 or not heat.any())
+    start = np.where(is_ray, load[:-1] / load[1:], 0.0)
+    given = np.array([not any(map(target.get, (*names, "temperature"))) for target in path_curves.targets(document)])
+    by_stress = broken & given[np.ceil(position - path_curves.SAME_LOAD).clip(1).astype(int) - 1]
+    begin = np.where(is_ray, work[1:] - stored[1:] * (1.0 - start**2), work[:-1] + 2.0 * by_stress * np.diff(lost))
+    dE, dT, C = np.diff(E, axis=0), np.diff(T), (2.0 * stored - (S * E).sum(axis=1)) / np.where(T == 0.0, np.inf, T)
+    slope = np.where(by_stress[:, None], np.diff(S, axis=0) * E[1:], S[1:] * dE).sum(axis=1) + C[1:] * dT
+    bend = slope - work[1:] + begin
+    is_early = ~broken & (np.abs(T[1:]) < np.abs(T[:-1]))
+    bend = np.where(is_early, work[1:] - begin - (S[:-1] * dE).sum(axis=1) - C[:-1] * dT, bend)
+    bend = np.where(is_ray, stored[1:] * (1.0 - start) ** 2, np.where(broken & (not by_events), 0.0, bend))
+
+    def straight(values: Array, first: Array) -> Array:
+        return np.asarray(first[:, None] + (values[1:] - first)[:, None] * STEPS)
+
+    curves = {"work": straight(work, begin) - bend[:, None] * STEPS * (1.0 - STEPS)}
+    for name in ("dissipated", "fracture_energy", "friction_heat"):
+        is_step = is_ray if name == "friction_heat" else by_events
+        curves[name] = straight(energy[name], np.where(is_step, energy[name][1:], energy[name][:-1]))
+    curves["stored"] = curves["work"] - curves["dissipated"] - curves["friction_heat"]
+    behind, tiny = curves["stored"][:, 0], np.finfo(float).tiny
+    in_springs = np.where(is_ray, springs[1:] * start**2, springs[:-1] * behind / np.maximum(stored[:-1], tiny))
+    share = (in_springs + springs[1:]) / np.maximum(behind + stored[1:], tiny)
+    bent = curves["stored"] - straight(stored, behind)
+    curves["stored_in_springs"] = straight(springs, in_springs) + share[:, None] * bent
+    for name in ENERGIES:  # the unloaded cell has no energies
+        curves[name][0] = energy[name][1] * STEPS**2
+    curves["load_factor"] = straight(load, load[:-1])
+    curves["axis"] = straight(table[axis], np.where(is_ray, start * table[axis][1:], table[axis][:-1]))
+    is_drawn = np.isin(STEPS, (0.0, 1.0)) | (np.diff(load)[:, None] > 0.01 * load[-1])  # between distant loads
+    return {name: values[is_drawn] for name, values in curves.items()}

@@ -74,6 +74,7 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
     places, temperature = loads(points), case["envelope"].get("temperature")
     notes = [] if temperature is None else [f"$\\Delta{{T}}={{{temperature:g}}}$ first"]
+    notes += ["which breaks bonds alone"] * (points[0].get("factor") == 0.0)
     notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
     if broken:
         # The closed curve through the loads, open where directions have no onset.

@@ -118,7 +118,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
         return [(partly or [last])[len(partly) // 2 if reported(document).name == "angle" else 0]]
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = landmarks.peak_of(document)
-    before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
+    before, after = of_point.get(peak.get("event", 0), names[0]), of_point.get(peak.get("event_left", -1), last)
     return list(dict.fromkeys([before, after if (status[after] != drawn_cell.BONDED).any() else last]))
 
 

@@ -18,17 +18,18 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of a path, with totals above rows of points.
 
     There are at most `limit` rows, by default `ROWS`.  The first five of these columns appear; a line names the others:
-    leading and prescribed strains, named and acting stresses, temperature, strains under prescribed stresses.
+    leading strain (temperature if it varies alone), prescribed strains, named and acting stresses, temperature, strains
+    under prescribed stresses.
     """
     points, numbers = document["path"], landmarks.chosen(document, limit or ROWS)
-    strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
+    strain, stress = columns_without_noise([point["strain"] for point in points]), path_curves.stresses(document)
     strains, stresses = voigt.voigt_names(strain.shape[1])
-    leading = path_curves.leading_component(document)
+    axis, values = path_curves.abscissa(document)
     visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
     prescribed = {name for target in path_curves.targets(document) for name in target}
     acting = path_curves.components_above(path_curves.FAINT, strain)
     driven = [k for k in acting if strains[k] in prescribed and path_curves.legs(document) > 1]
-    varying = {strains[k]: strain[:, k] for k in (leading, *driven)}
+    varying = {axis: values} | {strains[k]: strain[:, k] for k in driven}
     varying |= {stresses[k]: stress[:, k] for k in sorted(visible)}
     if any(point.get("temperature") for point in points):
         varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
@@ -51,49 +52,58 @@ def path_table(document: Document, limit: int | None = None) -> Table:
 
 def _peak_lines(document: Document, peak: Document) -> list[str]:
     """Describe the peak, the first break, the path after the peak, and scaling by the toughness."""
-    strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
     largest, name = landmarks.name_of(document, peak), peak["stress_name"] + stress_label(document)
     noun = document["case"]["path"]["method"].removesuffix("s")
-    leg_of = path_curves.legs_of(document)
-    curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[peak['event']]:.0f}"
-    end = np.flatnonzero(leg_of == leg_of[peak["event"]])[-1]
+    leg_of, event = path_curves.legs_of(document), peak.get("event", len(document["path"]) - 1)
+    curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[event]:.0f}"
+    end = np.flatnonzero(leg_of == leg_of[event])[-1]
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
-    text = f"{name} at the end of {curve}, no peak yet" if peak["event"] == end else f"Largest {name}"
+    text = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
     text = begins.get(largest, text)
-    text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g} ({_place(peak, '', noun)})"
+    no_peak = "No stress acts on the path, and there is no peak"
+    text = f"{text}: {_landmark(document, peak, '')}" if "event" in peak else no_peak
     for title in ("first_softening_", "first_break_"):
-        if f"{title}event" in peak:
-            first, at = peak[f"{title}stress"], peak[f"{title}strain"]
-            text += f"; {title.replace('_', ' ')}{first:.6g} at {at:.6g} ({_place(peak, title, noun)})"
-    stresses = landmarks.stresses_of(document, peak)
+        text += f"; {title.replace('_', ' ')}{_landmark(document, peak, title)}" if f"{title}event" in peak else ""
+    stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
         text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
-    later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
-    if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
+    later = max(range(event, len(stresses)), key=lambda number: abs(stresses[number]))
+    if later > event and abs(stresses[later]) > abs(peak["stress"]):
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
-    if largest == landmarks.LARGEST and peak["event"] != end:
+    if largest == landmarks.LARGEST and event != end:
         text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
-    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
+    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
     errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
     text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
-    strains, stresses_of_path = voigt.voigt_names(len(document["path"][0]["stress"]))
+    strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     for leg, k, number in path_curves.largest_of_legs(document):
-        strain, stress = (without_noise(document["path"][number][name][k]) for name in ("strain", "stress"))
+        strain, stress = document["path"][number]["strain"][k], path_curves.stresses(document)[number, k]
         if strains[k] != peak["strain_name"] and stress:
-            name = stresses_of_path[k] + stress_label(document)
-            lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {strains[k]} = {strain:.6g} (point {number})")
-    if path_curves.scales_with_toughness(document):
+            name, at = stress_names[k] + stress_label(document), _load_at(document, number, strains[k], strain)
+            lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {at} (point {number})")
+    if path_curves.scales_with_toughness(document) and path_curves.legs(document) == 1:
         lines.append("Scaling: strains and stresses of the path grow with the root of the toughness")
     return lines
 
 
-def _place(peak: Document, title: str, noun: str) -> str:
-    """Name the event or increment, fibre and direction of a landmark."""
-    return ", ".join(filter(None, [f"{noun} {peak[f'{title}event']}", landmarks.bond_of(peak, title)]))
+def _landmark(document: Document, peak: Document, title: str) -> str:
+    """Describe a landmark by its stress, if any, its strain or temperature, event or increment, fibre and direction."""
+    event, stress = peak[f"{title}event"], without_noise(peak[f"{title}stress"])
+    place = f"{document['case']['path']['method'].removesuffix('s')} {event}"
+    of_stress = f"{stress:.6g} " if stress or path_curves.temperature_of(document, event) is None else ""
+    at = _load_at(document, event, "" if title else peak["strain_name"], peak[f"{title}strain"])
+    return f"{of_stress}at {at} ({', '.join(filter(None, [place, landmarks.bond_of(peak, title)]))})"
+
+
+def _load_at(document: Document, number: int, name: str, strain: float) -> str:
+    """Return the strain at a point with its name, if any; on a leg that changes the temperature alone, this instead."""
+    if (temperature := path_curves.temperature_of(document, number)) is not None:
+        name, strain = load_sections.TEMPERATURE, temperature
+    return f"{name} = {without_noise(strain):.6g}".removeprefix(" = ")
 
 
 def _path_energies(document: Document, label: str) -> list[str]:

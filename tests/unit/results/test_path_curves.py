@@ -14,7 +14,7 @@ from feti_homog.results.path_curves import (
     leading_component,
     named_components,
     rising_strain,
-    shown_stresses,
+    shown_components,
     targets,
     what_rises,
 )
@@ -150,10 +150,10 @@ def test_the_strain_that_leads_is_among_those_that_are_named() -> None:
     """Poisson's strain and thermal ones may be larger."""
     path = mixed([{"temperature": -100.0}, {"S13": 1.0}], [[0] * 6, [0, 0, 0, 0, 1.0, 0]])
     path["path"][0]["strain"] = path["path"][1]["strain"] = [-20.0, -20.0, -3.0, 0.0, 7.0, 0.0]
-    assert leading_component(path) == 4 and shown_stresses(path) == [4]
+    assert leading_component(path) == 4 and shown_components(path) == ["S13"]
     cooled = mixed({"temperature": -100.0}, [[0] * 6])
     cooled["path"][0]["strain"] = [-1.0, -2.0, -0.5, 0.0, 0.0, 0.0]
-    assert leading_component(cooled) == 1 and shown_stresses(cooled) == [1]
+    assert leading_component(cooled) == 1 and shown_components(cooled) == ["E11", "E22", "E33"]
 
 
 @pytest.mark.parametrize(

@@ -67,3 +67,18 @@ def test_a_stress_that_is_missed_is_measured_by_the_load(strain, missed, holds):
     findings = Findings(checks(1e-8, False, has_coatings=False))
     check_loads(findings, cell, [state], [(load, {})])
     assert all(finding.holds for finding in findings.worst()) is holds
+
+
+@pytest.mark.parametrize(("rounding", "holds"), [(1e-13, True), (1e-11, False)])
+def test_a_temperature_near_zero_is_measured_by_the_largest(rounding, holds):
+    """A path from 80 to -50 passes zero at a load factor with rounding of both ends."""
+    rows, states = [], []
+    for number, (given, reached) in enumerate(((80.0, 80.0), (80.0 * rounding, 0.0), (-50.0, -50.0 - 80.0 * rounding))):
+        rows.append((Prescribed(np.array([0.0] * 6 + [given]), np.arange(7) < 6), {}))
+        zeros = {"strain": np.zeros(6), "mean_stress": np.zeros(6)}
+        states.append(SimpleNamespace(name=f"state {number}", point=number, temperature=reached, **zeros))
+    files = SimpleNamespace(document={"angle": [None] * 3})
+    cell = SimpleNamespace(files=files, reuss=np.eye(6), largest_strain=0.01, loads=lambda strain, temperature: strain)
+    findings = Findings(checks(1e-8, False, has_coatings=False))
+    check_loads(findings, cell, states, rows)
+    assert all(finding.holds for finding in findings.worst()) is holds

@@ -152,7 +152,9 @@ def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_risi
 
 def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
     points = [(0.5, 0.0, 0.0), (0.8, 1.0, 2.0), (1.0, 2.0, 3.0)]
-    figure = path_picture(in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0))
+    figure = path_picture(
+        in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0, broke=0)
+    )
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
     heated = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)]

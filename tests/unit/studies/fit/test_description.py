@@ -107,6 +107,8 @@ def test_tests_are_changes_of_one_case(tmp_path):
          "[measured] curve: expected the strain that rises along the path, E22"),
         ("strain = [0.1, 0.0, 0.0]", "E11, S11\n0.0, 0.0\n-0.01, 1.0\n",
          "[measured] curve: expected strains of the sign of the path, which ends at 0.1"),
+        ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.0999, 2.0\n-0.1, 2.0\n-0.08, 1.5\n0.0, 0.0\n",
+         "[measured] curve: expected strains that rise, without unloading from 0.1 to 0"),
         ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.11, 2.0\n",
          "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
         ("strain = [0.1, 0.0, 0.0]", "E11, S11\n10.0, 1.0\n",

@@ -38,6 +38,8 @@ def samples(scale):
     """Collect three realisations of a path with peaks of 3, 4 and 5 times a scale; S11 is noise."""
     documents = [path_document(4, 0.0) for _ in range(3)]
     for number, each in enumerate(documents):
+        moduli = {phase: {"young": scale * 70.0, "poisson": 0.2} for phase in ("matrix", "fibre")}
+        each["case"] = each["case"] | {"material": moduli}
         each["path"] = [
             point | {"stress": [scale * (-1) ** k * 2e-13, scale * (3 + number) * share, scale * 0.5 * share]}
             for k, (point, share) in enumerate(zip(each["path"], (0.5, 0.4, 1.0, 0.5), strict=True))

@@ -1,0 +1,100 @@
+"""Curves of later legs against a law of one bar, whose stiffness falls in breaks: no chords across them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feti_homog.report.plots import path_picture
+from feti_homog.results import path_curves
+
+ZERO = {"stored_in_springs": 0.0, "dissipated_strain_controlled": 0.0, "bonded": 1, "open": 0, "closed": 0}
+
+
+def bar(legs: list[dict[str, float]], rows: list[tuple[float, float, float, bool]], expansion: float = 0.0) -> Any:
+    """Return a path of bars along x1 with rows of load factor, stiffness, strain or stress, and whether a bond breaks.
+
+    The energies are integrals of the law S = K (E - a T), on the way to each row with its stiffness.
+    """
+    points, temperature, lost, last = list[dict[str, Any]](), 0.0, 0.0, (rows[0][1], 0.0, 0.0)
+    for load, stiffness, value, breaks in rows:
+        target = legs[int(np.ceil(load * len(legs) - 1e-9)) - 1]
+        by_stress, heats = "S11" in target, "temperature" in target
+        heat = value if heats else temperature
+        strain = value / stiffness + expansion * heat if by_stress else last[1] if heats else value
+        stress, free = stiffness * (strain - expansion * heat), last[1] - expansion * temperature
+        behind = last[2] / stiffness if by_stress else free  # elastic strain after the break
+        lost += 0.5 * last[0] * free**2 - 0.5 * stiffness * behind**2 + (behind - free) * last[2] * by_stress
+        stored = 0.5 * stress * (strain - expansion * heat)
+        points.append({"load_factor": load, "strain": [strain, 0.0, 0.0, 0.0, 0.0, 0.0], "temperature": heat} | ZERO)
+        points[-1] |= {"stress": [stress, *[0.0] * 5], "stored": stored, "work": stored + lost, "dissipated": lost}
+        points[-1]["broke"] = int(breaks)
+        last, temperature = (stiffness, strain, stress), heat
+    case = {"analysis": {"type": "path", "plane": "generalized"}, "path": {"method": "events", "waypoints": legs}}
+    return {"case": case | {"output": {}, "interface": {"contact": True}}, "path": points}
+
+
+def drawn(document: dict[str, Any]) -> tuple[Any, Any]:
+    """Return the corners of the later legs in path.png, and the work curve in energy.png."""
+    upper, energy = path_picture.figure(document).axes[0], path_picture.energies(document)
+    assert energy is not None
+    later = next(line for line in upper.lines if line.get_linewidth() == 2.0 and len(line.get_xdata()))
+    return later.get_xydata(), energy.axes[0].lines[0].get_xydata()
+
+
+def test_a_brittle_bond_drops_the_stress_at_its_strain() -> None:
+    """As the strain rises on: no stress, no more work, and all energy lost in the break at 3/5 of the path."""
+    document = bar(
+        [{"E11": 5.0}, {"E11": 30.0}], [(0.5, 1.0, 5.0, False), (0.6, 1.0, 10.0, True), (1.0, 0.0, 30.0, False)]
+    )
+    curve, work = drawn(document)
+    np.testing.assert_allclose(curve, [[5, 5], [10, 10], [10, 0], [30, 0]], atol=1e-12)
+    for place, value in ((0.5, 3.125), (1.0, 12.5), (1.1, 28.125), (1.2, 50.0), (1.21, 50.0), (1.6, 50.0), (2.0, 50.0)):
+        assert np.interp(place, *work.T) == pytest.approx(value)
+    nodes = [line for line in path_picture.figure(document).axes[-1].lines if len(line.get_xdata()) == 3]
+    assert {line.get_drawstyle() for line in nodes} == {"steps-pre"}
+
+
+def test_a_stiffness_left_and_unloading_are_straight_from_the_state_behind_the_break() -> None:
+    rows = [
+        (0.25, 4.0, 0.5, False),
+        (0.4, 4.0, 2.0, True),
+        (0.5, 1.0, 3.0, True),
+        (0.75, 0.5, 1.0, False),
+        (1.0, 0.5, 6.0, False),
+    ]
+    curve, work = drawn(bar([{"E11": 0.5}, {"E11": 3.0}, {"E11": 1.0}, {"E11": 6.0}], rows))
+    np.testing.assert_allclose(curve, [[0.5, 2], [2, 8], [2, 2], [3, 3], [3, 1.5], [1, 0.5], [6, 3]])
+    # The integral of the drawn stress is the drawn work.
+    area = np.sum(np.diff(curve[:, 0]) * (curve[1:, 1] + curve[:-1, 1]) / 2)
+    assert work[-1, 1] == pytest.approx(0.5 + area)
+    assert np.interp(2.5, *work.T) == pytest.approx(work[-1, 1] - (0.5 * 6**2 - 0.5 * 2.0**2) / 2)
+
+
+def test_under_a_given_stress_the_strain_jumps() -> None:
+    rows = [(0.5, 2.0, 4.0, False), (0.75, 2.0, 8.0, True), (1.0, 1.0, 12.0, False)]
+    curve, work = drawn(bar([{"S11": 4.0}, {"S11": 12.0}], rows))
+    np.testing.assert_allclose(curve, [[2, 4], [4, 8], [8, 8], [12, 12]])
+    before, behind = 16.0, 16.0 + 8.0 * 4.0
+    assert {before, behind} <= {*np.round(work[np.isclose(work[:, 0], 1.5), 1], 9)}
+    assert np.interp(1.75, *work.T) == pytest.approx(behind + (10.0**2 - 8.0**2) / 2)
+
+
+def test_energies_of_temperature_legs_are_parabolas() -> None:
+    """Held, a bar stores K (a T)^2 / 2."""
+    legs = [{"temperature": 1.0, "E11": 0.0}, {"temperature": 3.0}, {"temperature": 0.0}]
+    rows = [(1 / 3, 2.0, 1.0, False), (2 / 3, 2.0, 3.0, False), (1.0, 2.0, 0.0, False)]
+    document = bar(legs, rows, expansion=1.0)
+    _, work = drawn(document)
+    for place, temperature in ((0.5, 0.5), (1.5, 2.0), (2.5, 1.5), (2.75, 0.75)):
+        assert np.interp(place, *work.T) == pytest.approx(temperature**2)
+
+
+def test_lines_end_where_the_state_behind_a_break_is_unknown() -> None:
+    """Two strains change: the work gives one number for two stresses; one is left alone."""
+    rows = [(0.5, 1.0, 5.0, False), (0.6, 1.0, 10.0, True), (1.0, 0.5, 30.0, False)]
+    document = bar([{"E11": 5.0}, {"E11": 30.0, "gamma12": 0.001}], rows)
+    corner = path_curves.later_corners(document)[1]
+    assert np.isnan(corner["stress"][0]) and corner["strain"][0] == 10.0 and corner["stress"][1] == 0.0
+    curve, _ = drawn(document)
+    assert np.isnan(curve[2, 1]) and curve[3].tolist() == [30.0, 15.0]

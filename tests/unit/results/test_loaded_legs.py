@@ -1,0 +1,124 @@
+"""Paths with legs of temperature: the landmarks look at the leg that carries load; noise of the solve is no load."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feti_homog.materials import voigt
+from feti_homog.report.text.path_table import path_table
+from feti_homog.results import path_curves
+from feti_homog.results.landmarks import marks, passed_strengths, peak_of
+from feti_homog.studies.outputs import outputs
+
+ENERGIES = {
+    "work": 0.1,
+    "stored": 0.1,
+    "stored_in_springs": 0.0,
+    "dissipated": 0.0,
+    "dissipated_strain_controlled": 0.0,
+}
+COUNTS = {"bonded": 1, "open": 0, "closed": 0, "debonded_share": 0.0}
+NOISE = 3e-14
+
+
+def path(waypoints: list[dict[str, float]], rows: list[tuple[Any, ...]], unit: float = 1.0) -> dict[str, Any]:
+    """Return a path in generalized plane strain.
+
+    `rows` have load factor, temperature, strains and stresses by name, and the number of bonds that break; stresses
+    and moduli have the factor `unit`, and all other stresses are noise.
+    """
+    points = []
+    for load, temperature, values, broke in rows:
+        strain, stress = np.zeros(6), NOISE * np.array([1.0, -1.0, 2.0, 0.5, -3.0, 1.0])
+        for name, value in values.items():
+            for names, components in ((voigt.SPATIAL_STRAINS, strain), (voigt.SPATIAL_STRESSES, stress)):
+                if name in names:
+                    components[names.index(name)] = value
+        point = {"load_factor": load, "strain": strain.tolist(), "stress": (unit * stress).tolist(), "broke": broke}
+        points.append(point | {"temperature": temperature} | ENERGIES | COUNTS)
+    section = {"method": "events"} | ({"waypoints": waypoints} if len(waypoints) > 1 else {"to": waypoints[0]})
+    material = {"matrix": {"young": 3000.0 * unit, "poisson": 0.3}, "fibre": {"E_axial": 70000.0 * unit}}
+    case = {"analysis": {"plane": "generalized"}, "path": section, "material": material}
+    return {"case": case, "path": points}
+
+
+def text(document: dict[str, Any]) -> str:
+    return " ".join(" ".join(path_table(document).lines).split())
+
+
+HEATED = [(0.25, 40.0, {"E11": 0.002, "E33": 0.001}, 1), (0.2, 32.0, {"E11": 0.0025, "E33": 0.0008}, 1)]
+TENSION = [(0.5, 80.0, {"E11": 0.004, "E33": 0.002}, 0), (0.6, 80.0, {"E11": 0.005, "S11": 0.4}, 1),
+           (0.7, 80.0, {"E11": 0.006, "S11": 0.1}, 1), (1.0, 80.0, {"E11": 0.02, "S11": 16.0}, 0)]  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e9])
+def test_without_stress_there_is_no_peak_but_a_temperature_of_the_first_break(unit: float) -> None:
+    rows = [(2 * load, *rest) for load, *rest in HEATED] + [(1.0, 80.0, {"E11": 0.005, "E33": 0.003}, 0)]
+    document = path([{"temperature": 80.0}], rows, unit)
+    assert not path_curves.stresses(document).any() and path_curves.shown_components(document) == ["E11", "E33"]
+    peak = peak_of(document)
+    assert not {"event", "stress", "so_far"} & peak.keys() and peak["first_break_event"] == 0
+    assert marks(document) == {0: "first break", 2: "end"}
+    words = text(document)
+    assert "No stress acts on the path, and there is no peak; first break at temperature = 40 (event 0)" in words
+    assert "event temperature E11 E33 load" in words and "S11" not in words
+    phase = {"phase": "epoxy", "utilisation": [0.5, 0.8, 1.3]}
+    (line,) = passed_strengths(document | {"phase_stresses": [phase]}, peak, range(3))
+    assert line.endswith("reaches 1 at about temperature = 51.2; the path takes the phase as elastic beyond")
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e9])
+def test_the_leg_that_carries_load_has_the_peak(unit: float) -> None:
+    """Bonds broke before it, so that its early fall is no peak."""
+    document = path([{"temperature": 80.0}, {"E11": 0.02}], HEATED + TENSION, unit)
+    peak = peak_of(document)
+    assert (peak["stress_name"], peak["event"], peak["first_break_event"]) == ("S11", 5, 0)
+    assert peak["stress"] == pytest.approx(16.0 * unit) and peak["first_break_stress"] == 0.0
+    words = text(document)
+    assert "S11 at the end of leg 2, no peak yet: " in words
+    assert "first break at temperature = 40 (event 0)" in words and "falls" not in words
+
+
+def test_a_temperature_leg_under_stress_names_its_largest_stress() -> None:
+    """Strains are held; the shear strain alone is free, and has no stress."""
+    held = {"temperature": 80.0, "E11": 0.0, "E22": 0.0, "E33": 0.0}
+    rows = [(0.5, 40.0, {"S11": -20.0, "S22": -20.0, "S33": -21.0, "gamma12": 7e-6}, 1),
+            (1.0, 80.0, {"S11": -40.0, "S22": -40.0, "S33": -42.0, "gamma12": 1.4e-5}, 0)]  # fmt: skip
+    words = text(path([held], rows))
+    assert "S33 at the end of the path, no peak yet: -42 at temperature = 80 (event 1)" in words
+    assert "; first break -21 at temperature = 40 (event 0)" in words and "event temperature S11 S22 S33" in words
+
+
+def test_the_component_of_the_leg_where_damage_begins_leads() -> None:
+    """An earlier leg has a larger strain, and compression before counts for no peak."""
+    legs = [{"E11": -0.02}, {"E11": 0.0}, {"gamma12": 0.03}, {"E11": 0.02}]
+    rows = [(0.25, 0.0, {"E11": -0.02, "S11": -90.0}, 0), (0.5, 0.0, {}, 0),
+            (0.75, 0.0, {"gamma12": 0.03, "S12": 60.0}, 0),
+            (0.85, 0.0, {"E11": 0.005, "S11": 30.0, "gamma12": 0.03, "S12": 60.0}, 1),
+            (0.9, 0.0, {"E11": 0.006, "S11": 20.0, "gamma12": 0.03, "S12": 50.0}, 1),
+            (1.0, 0.0, {"E11": 0.02, "S11": 28.0, "gamma12": 0.03, "S12": 40.0}, 0)]  # fmt: skip
+    words = text(path(legs, rows))
+    assert "Peak S11: 30 at E11 = 0.005 (event 3); first break 30 at 0.005 (event 3); then falls by 33.3%" in words
+    assert "Largest S12 of leg 3: 60 at gamma12 = 0.03 (point 2)" in words
+
+
+def test_paths_scale_with_the_toughness_if_all_loads_grow_together() -> None:
+    document = path([{"temperature": 80.0}, {"E11": 0.02}], HEATED + TENSION)
+    document["case"]["interface"] = {"criterion": "energy", "toughness": 0.01}
+    assert path_curves.scales_with_toughness(document) and "Scaling" not in text(document)
+    document["case"]["path"] = {"method": "events", "to": {"temperature": 80.0, "E11": 0.02}}
+    assert "Scaling: strains and stresses of the path grow with the root of the toughness" in text(document)
+
+
+def test_tables_of_studies_have_the_temperature_at_onset_and_the_peak_of_the_loaded_leg() -> None:
+    document = path([{"temperature": 80.0}, {"E11": 0.02}], HEATED + TENSION)
+    solver = dict.fromkeys(("ranks", "subdomains", "dofs", "multipliers"), 1) | {"iterations": [0]}
+    cell = {"fibre_fraction": 0.4, "elements": 1, "nodes": 1}
+    document |= {"solver": solver, "cell": cell, "checks": {}, "timings": {}, "memory": 1}
+    values = outputs(document)
+    assert (values["onset_temperature"], values["peak_S11"], values["peak_E11"]) == (40.0, 16.0, 0.02)
+    assert values["onset_S11"] == values["peak_S22"] == 0.0
+    for point in document["path"]:
+        point["stress"] = [NOISE] * 6
+    assert not {name for name in outputs(document) if name.startswith("peak_")}
