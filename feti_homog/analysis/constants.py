@@ -240,7 +240,7 @@ def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> 
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return one part `name` (of PARTS) of the errors of stiffness and thermal stress; {} without errors."""
+    """Return the part `name`, one of PARTS, of stiffness and thermal stress errors; {} without errors."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))

@@ -207,7 +207,7 @@ def check_stored(values: Mapping[str, Any]) -> None:
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Read all sections of a document; return the fields of `Case`, and all faults.
 
-    A faulty section is None, but materials and PETSc options stay tables.  Without a folder the cell is None.
+    A faulty section is None; [material] keeps valid phases, [petsc] all options.  Without a folder the cell is None.
     """
     analysis = document.get("analysis")
     if isinstance(analysis, dict) and analysis.get("type") == "conductivity":

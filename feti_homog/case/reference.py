@@ -87,7 +87,7 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
-    """Return the key tables: all in `ORDER`, the tables of a section, or tables with a `word`.
+    """Return key tables in `ORDER`: all without a `word`, the tables of the section `word`, or tables with the word.
 
     The search in names and descriptions of keys and sections ignores case, and treats underscores as spaces. A table
     has only the keys with the word, unless its name has the word.

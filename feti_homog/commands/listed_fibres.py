@@ -73,12 +73,12 @@ class ListedFibres:
         size: (2,) width and height.
         ellipses: N circles and ellipses; their centres are as in the table, or within the cell without a table.
         phases: N phase names; in cells that the program meshes, voids follow the fibres.
-        coatings: (N,) thickness of the coatings, 0 without a coating.
+        coatings: (N,) thickness of the coatings: 0 without a coating, NaN if unknown.
         cores: (N,) radii of the voids within hollow fibres, else 0.
         origin: (2,) lower left corner.
         lacks_voids: whether the cell has voids that the list omits.
         others: table columns (N,) for fibres that are neither discs nor ellipses, NaN for discs and ellipses;
-            `ellipses` represents these other fibres by discs of equal area.
+            `ellipses` has discs of equal area for these other fibres, or NaN frames if they are in a mesh.
     """
 
     size: Float

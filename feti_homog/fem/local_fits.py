@@ -136,7 +136,7 @@ def gathered(place: Int, values: Float, size: int) -> Float:
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """Solve moments a = sums for coefficients a (n, p, k); slopes get RIDGE, moments are (n, p, p), sums (n, p, k)."""
+    """Solve moments (n, p, p) a = sums (n, p, k) for coefficients a (n, p, k); RIDGE keeps slope moments regular."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.diag(np.arange(moments.shape[1]) > 0)
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))

@@ -157,7 +157,7 @@ def _stresses(
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Return the `MEASURES` (n, v) of stresses (n, 6); principal stresses far below the largest are lower bounds."""
+    """Compute `MEASURES` (n, 3 + strength modes) of stresses (n, 6); small principal stresses may be lower bounds."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
     if not shears.any():

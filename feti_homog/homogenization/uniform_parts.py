@@ -140,7 +140,7 @@ class NestedInterior:
         fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
         place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
         interior: factor for the free displacements.
-        loads: (free, v) unit load forces Q on free displacements; None without voids and prescribed side tractions.
+        loads: (free, v) unit load forces Q on free displacements; None without voids or prescribed side tractions.
     """
 
     members: list[Subdomain]

@@ -103,7 +103,7 @@ def fibre_frames(torus: Torus) -> Float:
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
     """Find the fibres (k,) with boundaries on concentric ellipses.
 
-    A fibre lies inside the largest ellipse. Also returns a plane edge (k,) on it, and the mask (k,) of round fibres.
+    The largest must surround the fibre. Also returns a plane edge (k,) on it, and the mask (k,) of round fibres.
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)

@@ -212,7 +212,7 @@ class Evaluations:
         return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the data at x (n,), exact or by differences.  On rank 0.
+        """Return the derivatives (m, n) of the computed values by x (n,), exact or by differences.  On rank 0.
 
         With a softening law of few teeth, a step may change no datum: that side of the difference is then computed
         again with twice the step, up to a tenth of the width of the bounds.

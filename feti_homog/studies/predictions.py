@@ -1,4 +1,4 @@
-"""Relate the measured values of a fit to computed values in result.json, and to exact derivatives."""
+"""Find computed values for a fit or a study of scatter in result.json, and their derivatives by the unknowns."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -18,7 +18,7 @@ RATIOS = ("eta", "anisotropy", "deviation")
 
 
 def check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Check both tolerances, and that the status follows from checks, reasons of the solver and faults."""
+    """Check tolerances of checks and contact, and that the status follows from checks, solver reasons and faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
     # A tolerance from the command line is in no other entry, so that no law can check it.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))

@@ -98,7 +98,7 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
 
 
 def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
-    """Check that tips are the bonds beside broken bonds.  Modes and spring energies must fit.
+    """Check that `tips` of a point are the bonds beside broken bonds.  Tractions must give their modes and energies.
 
     Returns the state with the utilisation sqrt(G / toughness) of tips that break by energy release; G is in the file.
     """

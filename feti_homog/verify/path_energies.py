@@ -79,7 +79,7 @@ class PointNumbers:
 
 
 def check_stored(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check dissipation under strain control and, without temperature and friction, stored energies E.Sigma / 2."""
+    """Check dissipation under strain control and, without temperature or friction, stored energies E.Sigma / 2."""
     points = cell.files.document["path"]
     with_fields = {state.point for state in states}
     scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy

@@ -61,7 +61,7 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
 
 
 def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.SubdomainTable) -> Sharers:
-    """Find shared entities, except pinned vertex classes: vertices, then edges, sorted by key.  Collective."""
+    """Find the shared vertices, except pinned classes, and then the shared edges, both sorted by key.  Collective."""
     mesh = meshes.whole
     corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
     one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1

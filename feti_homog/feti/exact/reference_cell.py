@@ -258,7 +258,7 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 
 
 class BondedInverse(Preconditioner):
-    """The preconditioner z = H r, with the exact inverse H from a factored cell whose rows are all active.
+    """The preconditioner z = H r, with the inverse H of the dual operator from a factored cell with all rows active.
 
     It serves subdomains across materials, where no bond can break.
     """

@@ -143,7 +143,7 @@ class FaceSystem:
         return status_system.largest_share(unbalanced, self._sizes(status, load), slope) <= UNBALANCED
 
     def least_force(self, status: Status, load: Prescribed) -> float:
-        """Return UNBALANCED times the largest scaled force of the loads and prescribed slips."""
+        """Return the scaled force below which forces count as zero: a fraction of the forces of loads and slips."""
         return float(UNBALANCED * self._sizes(status, load).max(initial=0.0))
 
     def _sizes(self, status: Status, load: Prescribed) -> Float:

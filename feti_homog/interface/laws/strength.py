@@ -16,8 +16,8 @@ class Strength(BondLaw):
     """A criterion that combines the utilisations of the traction components.
 
     Attributes:
-        normal, tangential: strengths R^n and R^t, inf without a limit.
-        axial: strength R^a along the fibre, inf without a limit.
+        normal, tangential: strengths R^n and R^t, numbers or (p,) at p nodes; inf without a limit.
+        axial: strength R^a along the fibre, as above.
     """
 
     normal: float | Float
@@ -46,7 +46,7 @@ class Strength(BondLaw):
 
     @property
     def limits(self) -> Float:
-        """The strengths [normal, tangential, axial], (3,) or (k, 3)."""
+        """The strengths [normal, tangential, axial], (3,) or (p, 3)."""
         return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
 
 

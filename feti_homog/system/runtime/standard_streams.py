@@ -63,7 +63,7 @@ def launched_rank() -> int:
 
 
 def prepare() -> None:
-    """Escape characters that the locale lacks, and replace closed standard streams, before any output."""
+    """Make output streams escape characters that the locale lacks; replace closed ones by os.devnull.  Call first."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
