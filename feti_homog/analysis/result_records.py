@@ -75,8 +75,7 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., the given strain `strain`, or `load` with given "
-        "stresses"
+        "load: a unit strain `E11`, ..., minus a unit strain `-E11`, ..., the given `strain`, or `load` with stresses"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", records.DEGREES, "(t,)")
