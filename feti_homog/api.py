@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import json
 import os
 import sys
 import threading
@@ -12,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.case import Case
+from feti_homog.case import Case, toml_files
 from feti_homog.errors import CaseError, ExitCode, FetiHomogError, LibraryError
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import libraries, option_table, option_values
@@ -48,14 +49,16 @@ def run(
 
     Raises:
         TypeError: `case` is not a Case, or `comm` is not an intracommunicator.
-        CaseError, MeshError: the case cannot be run, PETSC_OPTIONS is faulty, or `out` cannot be used.
+        CaseError, MeshError: the case cannot be run, ranks of `comm` have different cases or arguments, PETSC_OPTIONS
+            is faulty, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; the computed part is in `out`.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
         FetiHomogError: a file cannot be written, MPI has ended, or another thread is in a call of this module.
     """
-    if not isinstance(case, Case):
-        raise TypeError(f"run takes a Case, not {type(case).__name__}: Case.load reads a file, Case.parse a document")
-    with _started(comm) as comm:
+    with _started(comm, case, out, fields, resume) as comm:
+        if not isinstance(case, Case):
+            is_for = "Case.load reads a file, Case.parse a document"
+            raise TypeError(f"run takes a Case, not {type(case).__name__}: {is_for}")
         from feti_homog.analysis import runner
 
         if out is None:
@@ -86,7 +89,7 @@ def run_sweep(
         ConvergenceError: cases failed; `collect_sweep` makes the table of the finished cases.
         FetiHomogError, LibraryError, TypeError: as in `run`.
     """
-    with _started(comm) as comm:
+    with _started(comm, cases, out, ranks_per_case, retry) as comm:
         from feti_homog.studies import case_runs, collect, sweep_cases
 
         given = (sweep_cases.expand, cases, Path()) if isinstance(cases, Mapping) else (sweep_cases.load, cases)
@@ -100,7 +103,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
 
     The sweep may still be running.  Raises CaseError if `out` is not a sweep folder, FetiHomogError if a write fails.
     """
-    with _started(comm) as comm:
+    with _started(comm, out, pictures) as comm:
         from feti_homog.studies import collect
 
         return mpi_errors.on_root(comm, collect.collect, Path(out), pictures)
@@ -123,7 +126,7 @@ def run_fit(
         CaseError: the fit is faulty, or `out` cannot be used.
         ConvergenceError: a case failed, or the data do not determine the unknowns.
     """
-    with _started(comm) as comm:
+    with _started(comm, fit, out, ranks_per_case, retry) as comm:
         from feti_homog.studies import fit_file
 
         given = (fit_file.parse, fit, Path()) if isinstance(fit, Mapping) else (fit_file.load, Path(fit))
@@ -215,8 +218,11 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 @contextlib.contextmanager
-def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
-    """Context manager: start PETSc unless it runs; yield `comm` (None: all ranks) to one thread.  Raises like `run`."""
+def _started(comm: Intracomm | None, *arguments: object) -> Iterator[Intracomm]:
+    """Context manager: start PETSc unless it runs; yield `comm` (None: all ranks) to one thread.  Collective.
+
+    The arguments of the call must be equal on all ranks.  Raises like `run`.
+    """
     standard_streams.prepare()
     process.prefer_own_toolkits()
     libraries.require()
@@ -231,6 +237,20 @@ def _started(comm: Intracomm | None) -> Iterator[Intracomm]:
         if "petsc4py.PETSc" not in sys.modules:
             # On all ranks, PETSc would wait for ranks without a case; cases have their own communicators.
             _start_petsc([], MPI.COMM_SELF)
+        if comm.size > 1 and len(set(comm.allgather(mpi_errors.agree(comm, _digest, arguments)))) > 1:
+            cure = "comm = MPI.COMM_SELF runs a case on each rank alone"
+            raise CaseError(f"the {comm.size} ranks have different cases or arguments; {cure}")
         yield comm
     finally:
         RUNNING.release()
+
+
+def _digest(arguments: tuple[object, ...]) -> str:
+    """Return a digest of the arguments of a call: cases, documents, file names, numbers.  Raises like `to_document`."""
+    plain = [
+        value.resolved() if isinstance(value, Case)
+        else toml_files.to_document(value) if isinstance(value, Mapping)
+        else value
+        for value in arguments
+    ]  # fmt: skip
+    return toml_files.short_digest(json.dumps(plain, default=str).encode())

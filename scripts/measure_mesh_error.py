@@ -10,8 +10,8 @@ refined twice more.
 
 `--factors` prints the values of `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_estimate.py: errors
 of elements and of arcs by the mesh itself / errors by the mesh refined less, for diagonal entries, in cells cut by
-bodies and across materials.  For quadratic elements in phases that lock it also prints (true error - arc error) /
-element error.
+bodies and across materials.  For quadratic elements in phases that lock, which need no coarser mesh, it also prints
+(true error - arc error) / element error.
 """
 
 import argparse
@@ -202,27 +202,29 @@ def both_errors(case: Case, exact: Float | None = None) -> Iterator[tuple[str, F
     """Yield, for each problem of a case, the label of the factors and (2, k) errors / errors of the coarser mesh.
 
     The rows are elements and arcs.  An exact stiffness in the plane adds a third row: (true - arc error) / element
-    error of the coarser mesh.
+    error of the coarser mesh, or of the mesh itself if no coarser mesh is needed.
     """
     cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
     context = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True))
     columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     for own in (each.cell for each in context.loads.problems):
         k = len(own.solver.problem.loads)
-        has_tips = any(response.debonded for response in responses[:k])  # their errors are those of the mesh itself
-        if is_nested(own, responses[:k]) and not has_tips:
-            fewer = own.lattice.halvings - own.nested_lattice.halvings
+        under_unit_loads, responses = responses[:k], responses[k:]
+        if any(response.debonded for response in under_unit_loads):  # errors at tips are those of the mesh itself
+            continue
+        is_coarser = is_nested(own, under_unit_loads)
+        if is_coarser or exact is not None:
+            fewer = own.lattice.halvings - own.nested_lattice.halvings if is_coarser else 0
             known = np.array(factors(own, fewer))[:, None]
-            whole, nested = (energy_errors(own, responses[:k], nested=less) for less in (False, True))
+            whole, nested = (energy_errors(own, under_unit_loads, nested=less) for less in (False, is_coarser))
             of_nested = np.array([np.diag(nested.elements), np.diag(nested.arcs)]) / known
             found = np.array([np.diag(whole.elements), np.diag(whole.arcs)]) / of_nested
             if exact is not None:
                 true = np.diag(columns["stiffness"] - exact) - np.diag(nested.arcs)
                 found = np.concatenate([found, true[None] / of_nested[:1]])
-            name = "sampled" if own.summary.across else "locked" if locks(own.subdomains, own.comm) else "nested"
+            name = "sampled" if own.summary.across else "locked" if locks(own.parts, own.comm) else "nested"
             bubbles = ", bubbles" if any(s.is_mixed for s in own.subdomains) else ""
             yield f"{name}, order {own.lattice.order}, {fewer} less{bubbles}", found
-        responses = responses[k:]
     cell.destroy()
 
 

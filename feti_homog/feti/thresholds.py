@@ -104,9 +104,9 @@ DENSE_COLUMNS_ONE_BY_ONE = 6
 # Stiffness ratio of a body above which products with its inverse are refined.  In a thin body the ratio is the product
 # of the largest diagonal entries of S and of its regularised inverse: up to 3e3 in discs and pieces around discs, 1.5e4
 # in rings with a thickness of 1/20 of the radius, 4e6 with 1/100.  There forces balance to 4e-12, without refinement to
-# 5e-8.  In any body the ratio is 1 / `Subdomain.compressible_share`, above the bound from nu = 0.49999 on: a matrix
-# with nu = 0.4999999 beside fibres of a thousandth of its modulus balances energies to 3e-9, without refinement to
-# 2e-4.
+# 5e-8; in pieces with a neck of 1/2000 between fibres, with a ratio of 2e6, to 3e-12 and 6e-9.  In any body the ratio
+# is 1 / `Subdomain.compressible_share`, above the bound from nu = 0.49999 on: a matrix with nu = 0.4999999 beside
+# fibres of a thousandth of its modulus balances energies to 3e-9, without refinement to 2e-4.
 ILL_CONDITIONED = 1e4
 
 # solver, krylov

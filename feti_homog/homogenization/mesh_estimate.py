@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.cut_bodies import SharedVertices
 
 # Ratios of element and arc errors to the errors on coarser meshes (`scripts/measure_mesh_error.py --factors`).  NESTED:
-# one and two halvings fewer, by element order.  LOCKED: cells with a phase that locks; true errors gave the ratios of
-# quadratic elements.  SAMPLED: one halving fewer, with fine displacements at coarse nodes, by whether bubbles exist.
+# one and two halvings fewer, by element order.  LOCKED: cells with a phase that locks; of quadratic elements, true
+# errors to estimates on the mesh itself.  SAMPLED: one halving fewer, with fine displacements at coarse nodes, by
+# whether bubbles exist.
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
-LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
+LOCKED = {1: (0.31, 0.34), 2: (4 / 3, 1.0)}
 SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
 # Element and arc errors may cancel; at least these fractions remain (`scripts/measure_mesh_error.py`).  LEAST_SHARE:
 # on the diagonal, and for two states if quadratic elements have interfaces that may part, or if few corners have most
@@ -120,7 +121,7 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
-    if locks(cell.subdomains, cell.comm) and fewer:
+    if (fewer or order == 2) and locks(cell.parts, cell.comm):
         return LOCKED[order]
     return NESTED[order][fewer - 1] if fewer else (1.0, 1.0)
 
@@ -129,7 +130,8 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether the mesh error follows from a coarser mesh.  Collective.
 
     Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with straight sides at
-    voids, with fibres other than circles and ellipses, and for linear elements without interfaces.  For debonded
+    voids, with fibres other than circles and ellipses, for linear elements without interfaces, and for quadratic
+    elements with a phase that locks.  For debonded
     responses it is true only if elements are linear and the mesh is graded to tips: a generated mesh, without
     `tip_size`, for an analysis in which no bonds break.
     """
@@ -137,6 +139,9 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     pieces = (s.submesh for s in cell.subdomains)
     straight = any(bool((piece.at_void[piece.edge_class] & (piece.turns == 0)).any()) for piece in pieces)
     if not lattice.halvings or cell.summary.has_corners or cell.comm.allreduce(straight, MPI.LOR):
+        return False
+    # Between given displacements, the pressure of a piece on a coarser mesh is its change of volume times lambda.
+    if lattice.order == 2 and locks(cell.parts, cell.comm):
         return False
     if not case.interfaces:
         return lattice.order == 2  # with linear elements both parts of the error cancel too often

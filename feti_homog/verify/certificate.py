@@ -19,7 +19,7 @@ from feti_homog.verify.constitutive_law import rounding
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks, unchecked
 from feti_homog.verify.path_energies import check_heat, check_losses, check_stored
-from feti_homog.verify.reading import COATING, FIELDS, JSON, opened
+from feti_homog.verify.reading import FIELDS, JSON, opened
 
 # Exceptions that numbers of an unexpected kind or shape raise.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError)
@@ -96,7 +96,7 @@ def checks_of(cell: DiscreteCell) -> list[Finding]:
     """List the laws with their limits for a result."""
     case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
     phases = *cell.elements.contrasts, *rounding(case, cell.files.phases, cell.stiffnesses)
-    return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], phases)
+    return checks(rtol, case["cell"]["geometry"] == "mesh", phases)
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:

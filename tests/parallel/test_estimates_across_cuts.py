@@ -71,6 +71,15 @@ def test_cuts_hardly_matter_on_the_mesh_refined_less(comm, order):
     np.testing.assert_allclose(cut, whole, rtol=0.01 if order == 1 else 0.1)
 
 
+def test_no_cut_changes_those_of_nearly_incompressible_phases(comm):
+    """Between given displacements, the pressure of a piece on a coarser mesh is its volume change times 1e8."""
+    phases = {"matrix": {"young": 3.0, "poisson": 0.49999999}, "fibre": {"young": 70.0, "poisson": 0.2}}
+    cell = {"geometry": "square", "mesh_size": 0.1, "refine": 1, "order": 2}
+    whole, cut = (estimate(on, n, cell=cell, material=phases) for on, n in ((MPI.COMM_SELF, 3), (comm, 9)))
+    np.testing.assert_allclose(cut, whole, rtol=1e-3)
+    assert cut[0, 0] == pytest.approx(126.51333 - 126.51290, rel=0.3)  # against a mesh refined four times
+
+
 def test_no_cut_moves_a_free_fibre(comm):
     """It may lie anywhere in its hole, turned by any angle."""
     free = {"contact": True, "debonded": [{"fibre": 1, "centre": 0.0, "angle": 360.0}]}

@@ -154,6 +154,24 @@ def test_what_is_no_case_is_refused(comm, case):
         run(case, comm)
 
 
+def test_ranks_with_different_cases_are_refused(comm, shared_path):
+    """Each rank would solve a part of its own case, without an error; alone, each rank may run it."""
+    case, out = with_fraction(0.3 + 0.1 * comm.rank), shared_path / str(comm.rank)
+    values = {"matrix": MATRIX | {"young": 1.0 + comm.rank}, "petsc": {"feti_ksp_max_it": 1000 + comm.rank}}
+    cases = [case, *(with_fraction(0.3, **{name: value}) for name, value in values.items())]
+    sweep = {k: v for k, v in case.resolved().items() if v != {}} | {"sweep": {"material.fibre.young": [1.0, 2.0]}}
+    calls = [lambda case=case: run(case, comm) for case in (*cases, None if comm.rank else case)]
+    calls += [lambda: run(cases[0].replace({"cell.fibre_fraction": 0.3}), comm, out=out)]
+    calls += [lambda: run_sweep(sweep, shared_path / "sweep", comm), lambda: collect_sweep(out, comm)]
+    for call in calls if comm.size > 1 else ():
+        with pytest.raises(CaseError, match=r"ranks have different cases or arguments; comm = MPI.COMM_SELF runs"):
+            call()
+    comm.barrier()
+    parallel_assert(comm, not list(shared_path.iterdir()))
+    fraction = run(case, MPI.COMM_SELF).cell.fibre_fraction
+    assert fraction == pytest.approx(0.3 + 0.1 * comm.rank, rel=0.03)
+
+
 def test_a_second_thread_is_refused(comm):
     """Two threads in PETSc would crash it."""
     with api._started(comm), ThreadPoolExecutor(1) as other:

@@ -63,8 +63,7 @@ class ExplicitInterfaceOperator:
         self._flexibility_diagonal = both.diagonal().copy()
         # Diagonal entries are lower bounds of matrix norms.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
-        is_thin = subdomain.is_thin and bool(conditioning > thresholds.ILL_CONDITIONED)
-        self._refines = is_thin or 1.0 / subdomain.compressible_share > thresholds.ILL_CONDITIONED
+        self._refines = max(conditioning, 1.0 / subdomain.compressible_share) > thresholds.ILL_CONDITIONED
         np.fill_diagonal(both, 0.0)
         self._both = both
 

@@ -131,7 +131,7 @@ def test_the_heat_of_an_increment_is_that_of_its_slips_in_a_whole_result(results
 def test_every_law_is_broken_by_some_example():
     """The law of given displacements on sides by a user's mesh: `test_falsified_sides`."""
     known = {*BREAK, "sides"}.union(*(laws for table in TABLES for _, _, laws in table.values()))
-    assert {check.name for check in checks(1e-8, users_mesh=False, has_coatings=False)} <= known
+    assert {check.name for check in checks(1e-8, users_mesh=False)} <= known
 
 
 def test_sizes_of_energy_release_rates_are_listed_as_unchecked(results, tmp_path):

@@ -15,7 +15,10 @@ CASES = {
     "stiff fibre of such a ratio": (MATRIX, {"young": 70.0, "poisson": -0.9999999}, "generalized"),
     "contrast 1e9": (MATRIX, {"young": 4e9, "poisson": 0.2}, "generalized"),
     "contrast 1e12": (MATRIX, {"young": 4e12, "poisson": 0.2}, "strain"),
+    "necks between fibres": ({"young": 3.0, "poisson": 0.35}, {"young": 3e4, "poisson": 0.2}, "strain"),
 }
+# Other cells than SQUARE.
+CELLS = {"necks between fibres": {"geometry": "square", "fibre_fraction": 0.785}}
 
 
 def scale(place, key):
@@ -41,7 +44,8 @@ CHANGES = {
 def extreme(request, tmp_path_factory):
     """Provide the folder of an extreme result; its own checks may refuse what rounding leaves."""
     matrix, fibre, plane = CASES[request.param]
-    document = {"cell": SQUARE, "material": {"matrix": matrix, "fibre": fibre}, "output": {"pictures": False}}
+    cell, material = CELLS.get(request.param, SQUARE), {"matrix": matrix, "fibre": fibre}
+    document = {"cell": cell, "material": material, "output": {"pictures": False}}
     folder = tmp_path_factory.mktemp("extreme") / "out"
     with contextlib.suppress(ConvergenceError):
         run(Case.parse(document | {"analysis": {"type": "stiffness", "plane": plane}}), MPI.COMM_SELF, out=folder)

@@ -56,6 +56,6 @@ def test_bounds_of_conductivities_are_those_of_bonds_without_resistance(bonds, w
     forms = {"axial": 3.0, "wiener": None, "hashin_shtrikman": None} | bounds
     document = {"effective_conductivity": k, "conductivity_estimates": forms}
     files = SimpleNamespace(document=document, interfaces=[bonds])
-    found = Findings(checks(1e-9, False, False))
+    found = Findings(checks(1e-9, False))
     check_conductivity(found, SimpleNamespace(files=files, fractions=np.array([0.5, 0.5]), stiffnesses=A))
     assert [one.name for one in found.worst() if not one.holds] == ["bounds"] * (bool(bonds) is with_bounds)

@@ -265,7 +265,7 @@ def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(resul
         noise[held] = -noise.sum(axis=0)
         assert np.abs(noise[held]).max() > 4 * np.abs(noise[inner]).max()
         for added in (noise, 10 * noise, np.roll(noise, inner[0] - held, axis=0)):
-            findings = Findings(checks(1e-8, users_mesh=False, has_coatings=False))
+            findings = Findings(checks(1e-8, users_mesh=False))
             check_gluing(findings, cell, state, replace(fields, force=fields.force + added))
             limits.append(next(found.holds for found in findings.worst() if found.name == "equilibrium"))
     assert limits == [True, False, False]

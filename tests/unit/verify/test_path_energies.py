@@ -97,7 +97,7 @@ def test_heat_of_an_increment_is_that_of_its_slips(heat, method, broke, holds):
     written = {"case": {"path": {"method": method}}, "document": {"path": points}}
     section, strength = {"criterion": "max", "friction": 0.3}, SimpleNamespace(strength=np.ones(1))
     files = SimpleNamespace(interfaces=[section], interface=place, fibres=strength, **written)
-    findings = Findings(checks(1e-8, False, has_coatings=False))
+    findings = Findings(checks(1e-8, False))
     before, behind = (rubbing(point, [Status.BONDED, Status.CLOSED, Status.OPEN]) for point in (2, 3))
     behind.jump[:, 1], behind.traction[:, 1] = [0.0, 0.1, 0.5], [5.0, 3.0, 0.0]
     check_step_heat(findings, SimpleNamespace(files=files, area=2.0), before, behind)

@@ -64,7 +64,7 @@ def test_a_stress_that_is_missed_is_measured_by_the_load(strain, missed, holds):
         largest_strain=strain,
         loads=lambda strain, temperature: strain,
     )
-    findings = Findings(checks(1e-8, False, has_coatings=False))
+    findings = Findings(checks(1e-8, False))
     check_loads(findings, cell, [state], [(load, {})])
     assert all(finding.holds for finding in findings.worst()) is holds
 
