@@ -12,7 +12,6 @@ from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.microstructure import phase_names
 from feti_homog.schema import TableReader, keys, wording
 
-GPA_TO_MPA = 1e3
 SUGGESTED = (phase_names.MATRIX, phase_names.FIBRE, phase_names.COATING, "fibre:2")  # phases may have any name
 FORMS_OF = {
     name: [form for form, constants in material_forms.MATERIAL_FORMS.items() if name in keys.keys_of(constants)]
@@ -146,16 +145,16 @@ def missing_expansions(tables: object, needed_by: str) -> list[str]:
 def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
     """List moduli that seem to have different units, and expansions above 1 %, one per line.
 
-    GPA_TO_MPA bounds the ratio of two moduli in one phase, and of fibre to matrix; no fibre is softer than the matrix.
+    The ratio of GPa to MPa bounds two moduli in one phase, and fibre to matrix; no fibre is softer than the matrix.
     """
-    lines, largest = list[str](), dict[str, float]()
+    lines, largest, gpa_to_mpa = list[str](), dict[str, float](), 1e3
     for phase, material in materials.items():
         section, named = f"[material.{wording.toml_key(phase)}]", vars(material).items()
         for name, value in named:
             if name.startswith("expansion") and value is not None and np.abs(value).max() > 1e-2:
                 lines.append(f"{section} {name} = {wording.toml_value(value)}: is it in units of 1e-6?")
         moduli = {name: value for name, value in named if value and name.startswith(("young", "E", "G"))}
-        if moduli and max(moduli.values()) >= GPA_TO_MPA * min(moduli.values()):
+        if moduli and max(moduli.values()) >= gpa_to_mpa * min(moduli.values()):
             high, low = (choose(moduli, key=moduli.__getitem__) for choose in (max, min))
             lines.append(f"{section} {high} {moduli[high]:g}, {low} {moduli[low]:g}: are both in one unit?")
         largest[phase] = float(np.max([*moduli.values(), *np.ravel(vars(material).get("stiffness", 0.0))]))
@@ -163,7 +162,7 @@ def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
     return lines + [
         f"[material.{wording.toml_key(phase)}] modulus {value:g}, [material.matrix] {matrix:g}: are both in one unit?"
         for phase, value in largest.items()
-        if phase != phase_names.COATING and value * matrix and not matrix <= value <= GPA_TO_MPA * matrix
+        if phase != phase_names.COATING and value * matrix and not matrix <= value <= gpa_to_mpa * matrix
     ]
 
 
