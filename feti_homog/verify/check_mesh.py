@@ -201,7 +201,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre"
     G, opening, shear, psi, length, angle, number = (np.array(tips[name]) for name in names)
     pair, third = (np.array(tips.get(name, [k] * len(G))) for name, k in (("interface", 1), ("G_III", 0.0)))
-    loads = [*NAMES[6 if "G_III" in tips else 3][0], "strain"]
+    loads = [*NAMES[6 if "G_III" in tips else 3][0], "strain", "load"]
     tips.leaves_open("G", "G_I", "G_II", "G_III")
     findings.compare("rates", G, opening + shear + third, np.abs(G), at)
     findings.compare("rates", shear + third, G * np.sin(np.radians(psi)) ** 2, np.abs(G), at)
