@@ -93,11 +93,15 @@ def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int 
 
 
 def abscissa(document: Document) -> tuple[str, Float]:
-    """Return the name and values (n,) of the leading strain; of the temperature if all waypoints change it alone."""
-    points, name = document["path"], load_sections.TEMPERATURE
-    if changed_components(document) or name not in points[0]:
-        name = voigt.voigt_names(len(points[0]["strain"]))[0][leading_component(document)]
-    return name, table_of(points)[name]
+    """Return the name and values (n,) of the leading strain.
+
+    If this strain is held at zero, or all waypoints change the temperature alone, return the temperature instead.
+    """
+    table, strains = table_of(document["path"]), voigt.voigt_names(len(document["path"][0]["strain"]))[0]
+    name, largest = strains[leading_component(document)], max(np.abs(table[strain]).max() for strain in strains)
+    is_held = np.abs(table[name]).max() <= ZERO * largest or not changed_components(document)
+    name = load_sections.TEMPERATURE if is_held and table[load_sections.TEMPERATURE].any() else name
+    return name, table[name]
 
 
 def temperature_of(document: Document, number: int) -> float | None:
