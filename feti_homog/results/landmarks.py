@@ -125,18 +125,16 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
     The lines give stress and strain, or the temperature if only this changes.  Utilisations at the kept points
     `numbers` are interpolated linearly, from 0 on.
     """
-    lines, points = list[str](), [document["path"][number] for number in numbers]
-    component = voigt.voigt_names(len(points[0]["stress"]))[0].index(peak["strain_name"])
-    means = {peak[f"{name}_name"]: [point[name][component] for point in points] for name in ("stress", "strain")}
+    lines, table = list[str](), path_curves.table_of([document["path"][number] for number in numbers])
     before = ", before the largest stress of the path, which" if "event" in peak else "; the path"
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
         if k and numbers[k - 1] <= peak.get("event", numbers[-1]):
             is_thermal = path_curves.temperature_of(document, numbers[k - 1]) is not None
-            axes = {"temperature": [point["temperature"] for point in points]} if is_thermal else means
+            names = ("temperature",) if is_thermal else (peak["stress_name"], peak["strain_name"])
             ends = slice(k - 1, k + 1)
-            places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *mean][ends]):.4g}" for name, mean in axes.items()]
+            places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *table[name]][ends]):.4g}" for name in names]
             lines.append(
                 f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {', '.join(places)}{before} "
                 "takes the phase as elastic beyond"

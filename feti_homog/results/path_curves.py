@@ -54,16 +54,13 @@ def changed_components(document: Document, leg: int | None = None) -> list[int]:
 
 
 def stresses(document: Document) -> Float:
-    """Return the stresses (n, c) of the points, with zero for stresses up to `noise`."""
+    """Return the stresses (n, c) of the points, without noise."""
     stress = np.array([point["stress"] for point in document["path"]], float)
     return np.where(np.abs(stress) > noise(document), stress, 0.0)
 
 
 def noise(document: Document) -> float:
-    """Return the stress up to which stresses are noise of the solve.
-
-    It is `ZERO` times the largest stress or, if larger, the largest strain times the least modulus of the materials.
-    """
+    """Return the solver's noise: `ZERO` times the largest stress, or the largest strain times the least modulus."""
     strain, stress = (np.abs([point[name] for point in document["path"]]).max() for name in ("strain", "stress"))
     named = [constant for phase in document["case"].get("material", {}).values() for constant in phase.items()]
     moduli = [np.max(value) for name, value in named if value and name.startswith(("young", "E", "G", "stiffness"))]
@@ -96,11 +93,15 @@ def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int 
 
 
 def abscissa(document: Document) -> tuple[str, Float]:
-    """Return the name and values (n,) of the leading strain; of the temperature if all waypoints change it alone."""
-    points, name = document["path"], load_sections.TEMPERATURE
-    if changed_components(document) or name not in points[0]:
-        name = voigt.voigt_names(len(points[0]["strain"]))[0][leading_component(document)]
-    return name, table_of(points)[name]
+    """Return the name and values (n,) of the leading strain.
+
+    If this strain is held at zero, or all waypoints change the temperature alone, return the temperature instead.
+    """
+    table, strains = table_of(document["path"]), voigt.voigt_names(len(document["path"][0]["strain"]))[0]
+    name, largest = strains[leading_component(document)], max(np.abs(table[strain]).max() for strain in strains)
+    is_held = np.abs(table[name]).max() <= ZERO * largest or not changed_components(document)
+    name = load_sections.TEMPERATURE if is_held and table[load_sections.TEMPERATURE].any() else name
+    return name, table[name]
 
 
 def temperature_of(document: Document, number: int) -> float | None:
@@ -158,11 +159,8 @@ def legs(document: Document) -> int:
 
 def first_leg(document: Document) -> int:
     """Return the number of points on the first leg, or of all points for increments."""
-    points = document["path"]
-    if document["case"]["path"]["method"] == "increments":
-        return len(points)
-    end = (1.0 + SAME_LOAD) / legs(document)
-    return next((n for n, point in enumerate(points) if point["load_factor"] > end), len(points))
+    by_events = document["case"]["path"]["method"] == "events"
+    return int((legs_of(document) <= 1).sum()) if by_events else len(document["path"])
 
 
 def ends_of_legs(document: Document) -> list[int]:

@@ -87,16 +87,16 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     rising, _, end = max(loads, key=lambda load: abs(load[2]))
     if not is_strain and target.get(load_sections.TEMPERATURE):
         end = 0.0  # a temperature may reverse the sign of the strain
-    values = [datum.strain or 0.0 for datum in points]
-    sizes = np.abs([datum.strain or 0.0 for datum in points if datum.name == points[0].name])
+    values = np.array([datum.strain or 0.0 for datum in points])
+    sizes = np.abs(values)
     turns = landmarks.turning_points(sizes, landmarks.LEAST_DROP * sizes.max())
     falls = [f"from {sizes[a]:g} to {sizes[b]:g}" for a, b in pairwise(turns) if sizes[a] > sizes[b]]
     yield from [f"expected strains that rise, without unloading {fall}" for fall in falls[:1]]
     if rising != points[0].strain_name:
         yield f"expected the strain that rises along the path, {rising}"
-    elif any(value * end < 0 for value in values):
+    elif (values * end < 0).any():
         yield f"expected strains of the sign of the path, which ends at {end:g}"
-    elif is_strain and (largest := max(map(abs, values))) > abs(end) * (1 + path_curves.SAME_LOAD):
+    elif is_strain and (largest := sizes.max()) > abs(end) * (1 + path_curves.SAME_LOAD):
         hint = "; in per cent?" if 5.0 <= largest / abs(end) <= 200.0 else ""
         yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}{hint}"
 

@@ -187,8 +187,7 @@ def _data(documents: Documents) -> list[Datum]:
         pairs = zip(named, map(landmarks.peak_of, documents), strict=True)
         if len({("onset_load_factor" in values, "stress_left" in of) for values, of in pairs}) > 1:
             raise CaseError("[path]: bonds break, or the stress falls, in some runs and not in others; load it further")
-        ends = {"load_factor", peak["stress_name"], peak["strain_name"]}
-        ends |= {"temperature"} if len({values.get("onset_temperature") for values in named}) > 1 else set()
+        ends = "load_factor", "temperature", peak["stress_name"], peak["strain_name"]
         names = [n for n in names if n.partition("_")[2] in ends and any(values[n] for values in named)]
     return [Datum(0, name, 0.0, 1.0) for name in names]
 

@@ -78,7 +78,7 @@ CASES = {
     "path that softens": {"interface": HALF_OPEN | SOFTENING, "path": PATH},
     "path with friction": {"interface": HALF_OPEN | {"friction": 0.3}, "path": PATH},
     "path in space": IN_SPACE
-    | {"interface": WEAK, "path": {"waypoints": [{"temperature": -1.0}, {"S22": 0.01, "S13": 0.01}]}},
+    | {"interface": WEAK, "path": {"waypoints": [{"temperature": -1.0}, {"E22": 0.2, "S13": 0.01}]}},
     "load": {"interface": HALF_OPEN, "load": LOAD},
     "load in space": IN_SPACE | {"load": {"to": {"S22": 0.01, "S13": 0.01, "temperature": -1.0}}},
     "envelope": {

@@ -88,6 +88,9 @@ def test_a_temperature_leg_under_stress_names_its_largest_stress() -> None:
     words = text(path([held], rows))
     assert "S33 at the end of the path, no peak yet: -42 at temperature = 80 (event 1)" in words
     assert "; first break -21 at temperature = 40 (event 0)" in words and "event temperature S11 S22 S33" in words
+    # A later leg with a strain leaves the axis, which the strain held at zero cannot be.
+    document = path([held, {"E11": 0.001}], [(0.25, *rows[0][1:]), (0.5, *rows[1][1:]), (1.0, 80.0, {"E11": 1e-3}, 0)])
+    assert path_curves.abscissa(document)[0] == "temperature"
 
 
 def test_the_component_of_the_leg_where_damage_begins_leads() -> None:
