@@ -257,10 +257,9 @@ def _stress_error(document: Document) -> list[str]:
     """Return a note with the mean relative error of stresses, the root of the largest relative energy error, or []."""
     points = [document.get("load", {}), *document.get("path", ()), *document.get("angle", ())]
     energies = [point.get("mesh_error") for point in points] + [(document.get("mesh_error") or {}).get("energy")]
-    if not (largest := max(energy or 0.0 for energy in energies)):
-        return []
-    error = f"about {100 * largest**0.5:.2g} % in the root mean square"
-    return [f"  mesh error of stresses: {error}, at their peaks perhaps more"]
+    error = without_noise(max(energy or 0.0 for energy in energies) ** 0.5)
+    words = f"about {100 * error:.2g} % in the root mean square, at their peaks perhaps more"
+    return [f"  mesh error of stresses: {words}"] if error else []
 
 
 def _states(document: Document, count: int) -> Sequence[int]:
