@@ -193,7 +193,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
         return None
     case, legs, rises = document["case"], path_curves.legs(document), path_curves.is_proportional(document)
     # The stack needs a position that rises.
-    curves = _energy_curves(document, [points[k] for k in path_curves.rising_points(points)])
+    curves = energy_curves(document, [points[k] for k in path_curves.rising_points(points)])
     work, stored, springs, lost, fracture, heat = (curves[name] for name in ENERGIES)
     fracture = np.minimum(fracture, lost)
     rest = "other losses in breaks" if fracture.any() else "lost in breaks"
@@ -222,7 +222,7 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     return picture
 
 
-def _energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
     """Return `ENERGIES`, load factor and axis (n,) at drawn positions along `points`, from the unloaded cell on.
 
     Energies are quadratic along the straight way to a point ('), on the first leg a ray through zero.  The break before
@@ -234,9 +234,7 @@ def _energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> d
     table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}
     names, (*pairs, T) = voigt.voigt_names(len(points[0]["stress"]))[0], table.values()
     S, E = (np.array(pairs[part]).T for part in (slice(len(names)), slice(len(names), None)))
-    energy = {
-        name: np.array([0.0, *(float(p.get(name) or 0.0) for p in points)]) for name in (*ENERGIES, "load_factor")
-    }
+    energy = {n: np.array([0.0, *(point.get(n) or 0.0 for point in points)]) for n in (*ENERGIES, "load_factor")}
     work, stored, springs, lost, _, heat, load = energy.values()
     if path_curves.is_proportional(document):
         lost[1:] = [point["dissipated_strain_controlled"] for point in points]
