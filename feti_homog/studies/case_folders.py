@@ -157,7 +157,7 @@ def read_index(directory: Path) -> SweepIndex:
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**_replaced(entry, types.INF, math.inf)) for entry in document["cases"])
-        texts = document["name"], document["stress_unit"], *(entry.identity for entry in entries)
+        texts = [document["name"], document["stress_unit"], *(entry.identity for entry in entries)]
         counts = [number for e in entries for number in (e.number, e.point, e.realisation)]
         drawn = "cell.fibre_fraction"
         is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)

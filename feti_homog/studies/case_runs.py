@@ -73,9 +73,9 @@ def run_all(
 
             mpi_errors.on_root_only(comm, reset_failures)
         fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
-        if faults := [fault for fault in comm.allgather(fault) if fault is not None]:
+        if errors := [error for error in comm.allgather(fault) if error is not None]:
             remark = "finished cases are kept; the same command goes on with the others"
-            raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
+            raise FetiHomogError(*dict.fromkeys(line for error in errors for line in error.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
