@@ -100,7 +100,8 @@ class MeshSizes:
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
         """Return the sizes in a case / cell width; `tip` is `interface` without tips or without `tip_size`."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
-        return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
+        tip = cell.tip_size if has_tips and cell.tip_size is not None else interface
+        return cls(cell.mesh_size, interface, tip)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Return whether the mesh is finer on circles or at tips than elsewhere.
@@ -171,8 +172,8 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     # Between circles and sides, and at crossings.
     centres, radii = circles[:, :2] % size, circles[:, 2]
     for axis in AXES:
-        distance = np.where(axis > 0, size - centres, centres)[:, axis != 0][:, 0]
-        extreme, foot = (centres + along[:, None] * axis for along in (radii, distance))
+        distance = np.where(axis > 0, size - centres, centres) @ np.abs(axis)
+        extreme, foot = centres + radii[:, None] * axis, centres + distance[:, None] * axis
         sources += passages(np.abs(distance - radii), 1 / radii, (extreme, foot), (caps, largest))
         angle = np.arccos(np.minimum(distance / radii, 1.0))
         length = angle * radii / WEDGE
