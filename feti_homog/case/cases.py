@@ -223,8 +223,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         default = getattr(section, selector.key, None)
         value = table.get(selector.key, default) if isinstance(table, Mapping) else default
         selected[selector] = value if keys.keys_of(section)[selector.key].type.accepts(value) else None
-    conducts = selected[ANALYSIS_TYPE] == "conductivity"
-    if conducts or selected[PLANE] == voigt.CONDUCTION.name:
+    if (conducts := selected[ANALYSIS_TYPE] == "conductivity") or selected[PLANE] == voigt.CONDUCTION.name:
         selected[PLANE] = voigt.CONDUCTION.name if conducts else None
     faults = [f"[{section}]: missing section" for section in sections.REQUIRED if section not in document]
     for name, value in document.items():

@@ -69,6 +69,7 @@ UNCERTAINTY_MEANING = (
     "scatter of numbers, which `feti-homog uncertainty` propagates to constants, onsets and peaks, to first order. "
     "`feti-homog run` refuses this section."
 )
+RANGE_MEANING = "Values of a key that lie between two ends."
 NAME = KeyRow("name", types.text.expected, "", "the file's name", "", "Name of the case.")
 PETSC_OPTION = KeyRow(
     "feti_OPTION", sections.OPTION_EXPECTED, "", "", "",
@@ -103,9 +104,7 @@ def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(sections.UNCERTAINTY, f"[{sections.UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),
-        TableReference(
-            sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
-        ),
+        TableReference(sections.SWEEP, f"a range in [{sections.SWEEP}]", RANGE_MEANING, ranges),
     ]
     references.sort(key=lambda table: ORDER.index(table.section))
     if not word or word in ORDER:

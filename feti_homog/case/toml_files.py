@@ -67,9 +67,8 @@ def to_document(values: object) -> dict[str, Any]:
         CaseError: a key is not a string, an integer is too large for messages, or a table or list is too long or deep.
     """
     if not isinstance(values, Mapping):
-        raise TypeError(
-            f"expected the sections of a case as a dictionary, such as tomllib.load returns; got {_article(values)}"
-        )
+        expected = "expected the sections of a case as a dictionary, such as tomllib.load returns"
+        raise TypeError(f"{expected}; got {_article(values)}")
     faults: list[str] = []
     document: dict[str, Any] = _to_toml(values, (), faults)
     if faults:

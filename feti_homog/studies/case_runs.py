@@ -208,9 +208,8 @@ class CaseRunner:
                     status = f"failed ({error.faults[0]})"
                 except FetiHomogError:  # a file could not be written: the next run computes the case again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
-                        mpi_errors.on_root_only(
-                            self.comm, case_folders.set_aside, self.directory, entry, case_folders.Status.DAMAGED
-                        )
+                        damaged = case_folders.Status.DAMAGED
+                        mpi_errors.on_root_only(self.comm, case_folders.set_aside, self.directory, entry, damaged)
                     raise
                 seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
                 self._print(f"{entry.folder} of {len(self.sweep.entries)}: {status}, {seconds:.2f} s; {inputs}")

@@ -106,9 +106,9 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
             return ""
         return json.dumps(value) if isinstance(value, list | dict) else value
 
-    texts = [result_json.csv_text(map(cell, row) for row in rows) for rows in (cases, statistics)]
-    return [atomic.replace_text(directory / f"{name}.csv", text)
-            for name, text in zip(("cases", "statistics"), texts, strict=True)]  # fmt: skip
+    files = {"cases.csv": cases, "statistics.csv": statistics}
+    texts = {name: result_json.csv_text(map(cell, row) for row in rows) for name, rows in files.items()}
+    return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
 
 
 def _index_and_states(directory: Path) -> tuple[case_folders.SweepIndex, list[case_folders.CaseState]]:

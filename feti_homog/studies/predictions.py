@@ -78,8 +78,8 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
         yield "expected an analysis of type path, of one leg"
         return
     target = case.targets[0]
-    loads = [(strain, name, target[name]) for strain, stress in state.components for name in (strain, stress)
-             if target.get(name)]  # fmt: skip
+    strain_of = {name: strain for strain, stress in state.components for name in (strain, stress)}
+    loads = [(strain, name, target[name]) for name, strain in strain_of.items() if target.get(name)]
     is_strain = bool(loads) and all(name == strain for strain, name, _ in loads)
     if unknown or not (is_strain or len(loads) == 1):
         return

@@ -28,11 +28,10 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
         return contour_mesher.mesh_contours(phase, phases, cell)
     is_solid = phase != (*phases, phase_names.VOID).index(phase_names.VOID)
-    solid, number = np.flatnonzero(is_solid), phase[is_solid]
-    (rows, columns), n = phase.shape, phase.shape[1] + 1  # nodes in a row
+    solid, (rows, columns), n = np.flatnonzero(is_solid), phase.shape, phase.shape[1] + 1  # n: nodes in a row
     corners = (solid + solid // columns)[:, None] + [0, 1, n + 1, n]
     nodes, elements = present(corners, n * (rows + 1))
-    places = np.stack([nodes % n, nodes // n], axis=1)
+    places, number = np.stack([nodes % n, nodes // n], axis=1), phase[is_solid]
     representative = np.arange(len(nodes), dtype=np.int32)
     if cell.boundary == "periodic":
         node_class, first = places % [columns, rows] @ [1, n], np.empty(n * rows, np.int32)

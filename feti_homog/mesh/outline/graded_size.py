@@ -100,8 +100,7 @@ class MeshSizes:
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
         """Return the sizes in a case / cell width; `tip` is `interface` without tips or without `tip_size`."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
-        tip = cell.tip_size if has_tips and cell.tip_size is not None else interface
-        return cls(cell.mesh_size, interface, tip)
+        return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Return whether the mesh is finer on circles or at tips than elsewhere.
