@@ -66,7 +66,7 @@ class Rule:
                     matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: types.MOST_ROWS])]
                 elif isinstance(parent, dict) and step in parent:
                     matches.append((name, f"{place}.{step}" if place else step, parent[step]))
-        faulty = (match for match in matches if not (match[2] is None or (self.holds and self.holds(match[2]))))
+        faulty = (match for match in matches if match[2] is not None and not (self.holds and self.holds(match[2])))
         for count, (section, place, value) in enumerate(faulty):
             words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
             shown = wording.toml_value(value) if count <= MOST_FAULTS else ""  # others are only counted

@@ -186,11 +186,11 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
         return state
-    document, status = None, Status.RUNNING if is_running else Status.WAITING
+    document, status = None, Status.WAITING
     with contextlib.suppress(FetiHomogError):  # no event yet, or an unreadable one, which the next run names
         document = output_folder.latest(folder)
-        status = Status.RUNNING if is_running else Status.INTERRUPTED
-    return CaseState(status, (document or {}).get("unfinished", ""), document)
+        status = Status.INTERRUPTED
+    return CaseState(Status.RUNNING if is_running else status, (document or {}).get("unfinished", ""), document)
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:

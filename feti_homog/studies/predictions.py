@@ -153,8 +153,8 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
             column = dict(zip(sensitivities["constants"], values, strict=True))
             return np.array([column[datum.name] for datum in data])
         section, idle = name.partition(".")[0], ("strength", "toughness")
-        is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
-        return np.zeros(len(data)) if is_idle else None
+        is_idle = {"material": ".expansion" in name, "interface": name.endswith(idle)}
+        return np.zeros(len(data)) if is_idle.get(section) else None
     key, case = name.removeprefix("interface."), document["case"]
     is_alike = case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
     is_alike |= case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None

@@ -164,7 +164,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     is_outer = np.diff(disc, prepend=-1) > 0
     outer, longest = circles[is_outer], caps[is_outer]
     first, second, vector = arrangements.neighbours(outer[:, :2], size, 2 * outer[:, 2].max() + largest)
-    distance, (one, other) = np.linalg.norm(vector, axis=1), (outer[first], outer[second])
+    distance, one, other = np.linalg.norm(vector, axis=1), outer[first], outer[second]
     gap, normal = distance - one[:, 2] - other[:, 2], vector / distance[:, None]
     faces = one[:, :2] + one[:, 2:] * normal, other[:, :2] - other[:, 2:] * normal
     sources = passages(gap, 1 / one[:, 2] + 1 / other[:, 2], faces, (longest[first], longest[second]))

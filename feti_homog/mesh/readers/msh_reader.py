@@ -147,13 +147,13 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     reach = tolerance * float(np.ptp(plane[:, 0]))
     sides = {}
     for axis in (0, 1):
-        for extreme in (np.min, np.max):
+        for end, extreme in (("low", np.min), ("high", np.max)):
             along = plane[outer, axis]
             side = outer[np.abs(along - extreme(along)) <= reach]
             plane[side, axis] = np.median(plane[side, axis])
-            sides[axis, extreme is np.max] = side
+            sides[axis, end] = side
     for axis in (0, 1):
-        low, high, along = sides[axis, False], sides[axis, True], plane[:, 1 - axis]
+        low, high, along = sides[axis, "low"], sides[axis, "high"], plane[:, 1 - axis]
         distance, to_high = cKDTree(along[high, None]).query(along[low, None])
         to_low = cKDTree(along[low, None]).query(along[high, None])[1]
         mutual = (to_low[to_high] == np.arange(len(low))) & (distance <= reach)

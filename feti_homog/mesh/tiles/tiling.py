@@ -200,7 +200,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
     Also returns the class (n,) of each node, numbered in the cell, and the tile (m,) of each triangle.
     """
-    scalars, pairs, triples = (np.zeros((0, *shape), np.int64) for shape in ((), (2,), (3,)))
+    scalars, pairs, triples = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3), np.int64)
     parts: list[tuple[Array, ...]] = [(scalars, scalars, 0.0 * pairs, triples, scalars, scalars, pairs, scalars)]
     for filled in tiles:
         tile, filling, curves = filled.tile, filled.filling, filled.tile.curves
