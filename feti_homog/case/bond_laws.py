@@ -39,7 +39,8 @@ class BondLawEntry:
         """Return the fault of the required key `name` that a table lacks, in most cases with a possible value."""
         fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
-            return f"{fault}, such as {normal}{f' = {wording.toml_value(table[normal])}' if normal in table else ''}"
+            value = f" = {wording.toml_value(table[normal])}" if normal in table else ""
+            return f"{fault}, such as {normal}{value}"
         if name == COHESIVE[0] and "between" in table:
             return f"{fault}; bonds that hold have {' = inf, '.join(COHESIVE[:2])} = inf, and no other constants"
         hint = "100 E / r, E of the matrix, r of the fibres" if self.softens else "s^2 / (2 toughness) of a strength s"
@@ -50,6 +51,7 @@ STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
+TANGENTIAL = ("tangential_stiffness", "tangential_strength", "tangential_toughness")
 BRANCH = ("openings", "tractions")
 """Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH only to the law "table"."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
@@ -74,16 +76,16 @@ REGISTRY = (
         BondLawEntry(
             name,
             f"softening.{name.capitalize()}Law",
-            (*COHESIVE, *OF_SOFTENING, *(BRANCH if name == "table" else ())),
+            (*COHESIVE, *OF_SOFTENING, *branch),
             description,
             tuple(zip(("N", "S", r"G_\mathrm{n}", r"G_\mathrm{t}"), COHESIVE, (True, True, False, False), strict=True)),
             needs=needs,
             softens=True,
         )
-        for name, description, needs in (
-            ("bilinear", "linear softening", (*STIFFNESSES, *COHESIVE)),
-            ("exponential", "exponential softening", (*STIFFNESSES, *COHESIVE)),
-            ("table", "softening by openings and tractions", (*STIFFNESSES[1:], *COHESIVE[1::2], *BRANCH)),
+        for name, description, needs, branch in (
+            ("bilinear", "linear softening", (*STIFFNESSES, *COHESIVE), ()),
+            ("exponential", "exponential softening", (*STIFFNESSES, *COHESIVE), ()),
+            ("table", "softening by openings and tractions", (*TANGENTIAL, *BRANCH), BRANCH),
         )
     ),
 )

@@ -147,9 +147,11 @@ class Case:
         bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
         tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in bonds]
         tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
-        units = [f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are both in one unit?"
-                 for section, table, end in tables for name, value in vars(table).items()
-                 if name.endswith(end) and least < (value or 0.0) < float("inf")]  # fmt: skip
+        units, words = list[str](), f"above {least:g}, the stiffness of a phase: are both in one unit?"
+        for section, table, end in tables:
+            strengths = {name: value or 0.0 for name, value in vars(table).items() if name.endswith(end)}
+            high = {name: value for name, value in strengths.items() if least < value < float("inf")}
+            units += [f"[{section}] {name} = {value:g}: {words}" for name, value in high.items()]
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
@@ -157,8 +159,8 @@ class Case:
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else (*self.cell.table.remarks, *cell_sizes.default_size(self.cell))
-        of_load = *stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane)
-        return *of_elements, *unlike_units(self.materials), *of_table, *of_load
+        of_load = (*stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane))
+        return (*of_elements, *unlike_units(self.materials), *of_table, *of_load)
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a document; `parse` turns it into an equal case."""
@@ -234,8 +236,9 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
             fit = "it belongs to the file of a fit; `feti-homog fit` runs it" if name in sections.FIT_SECTIONS else ""
             hint = fit or wording.suggestion(name, sections.TOP_LEVEL, sections.KEY_OWNERS)
             faults.append(f"{key}: unknown {'section' if is_section else 'key'}; {hint}")
-    if complaint := types.text.complaint(name := document.get("name", "case")):
-        faults.append(f"name = {wording.toml_value(name)}: {complaint}")
+    title = document.get("name", "case")
+    if complaint := types.text.complaint(title):
+        faults.append(f"name = {wording.toml_value(title)}: {complaint}")
     reader = TableReader(selected, sections.KEY_OWNERS, faults)
     rules = _applicable(frozenset(document.keys() & sections.SECTIONS.keys()), tuple(selected.items()))
     of_rules = [[*rule.faults(document, selected)] for rule in rules]

@@ -85,10 +85,12 @@ def sized(
         table: the [cell] table of the file, with or without an order.
         free_faces: whether the cell has voids, or the case a section [interface].
     """
-    locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
-    if is_given and cell.order == 1:
-        faults += [f"[cell] order = 1: linear triangles lock: {line}; expected order = 2" for line in locking]
-    orders = (cell.order,) if is_given else (2,) if locking else (1, 2)
+    locking = _above(LOCKING_POISSON, materials, plane)
+    orders = [2] if locking else [1, 2]
+    if "order" in table:
+        orders = [cell.order]
+        if cell.order == 1:
+            faults += [f"[cell] order = 1: linear triangles lock: {line}; expected order = 2" for line in locking]
     if cell.accuracy is None:
         return replace(cell, order=orders[0])
     refinements = {}
@@ -98,10 +100,8 @@ def sized(
     order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
     if refinements[order] > MOST_REFINED:
         better = "a larger value, or order = 2" if order == 1 else "a larger value"
-        faults.append(
-            f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
-            f"{MOST_REFINED}; expected {better}"
-        )
+        reason = f"would need elements split {refinements[order]} times, more than {MOST_REFINED}"
+        faults.append(f"[cell] accuracy = {cell.accuracy:g}: {reason}; expected {better}")
     fibres, height = fibres_and_height(cell)
     mesh_size = float(f"{min(1.0, sqrt(height / fibres)) / 2:.2g}")
     return replace(cell, mesh_size=mesh_size, refine=refinements[order], order=order)
@@ -197,23 +197,23 @@ def mixed_width(cell: Cell) -> float | None:
 
 def size_faults(cell: Cell) -> list[str]:
     """List the faults in fractions, radii, numbers of fibres and element sizes of a cell."""
-    faults, largest = list[str](), ("mesh_size", cell.mesh_size)
+    faults = list[str]()
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
         limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
         if cell.fibre_fraction >= limit:
             reason = "there the coatings touch" if cell.coating else "there the fibres touch"
-            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
-            faults.append(
-                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
-                f"{wording.limit_in_words(limit, cell.fibre_fraction, 4)} for "
-                f"geometry = {wording.toml_value(cell.geometry)}: {reason}"
-            )
+            if spacing > (cell.coating or 0.0):
+                reason = "no circles min_gap apart are denser"
+            expected = f"expected less than {wording.limit_in_words(limit, cell.fibre_fraction, 4)}"
+            place = f"{expected} for geometry = {wording.toml_value(cell.geometry)}"
+            faults.append(f"[cell] fibre_fraction = {cell.fibre_fraction}: {place}: {reason}")
+    coarser, largest = "mesh_size", cell.mesh_size
     for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
-        if size is not None and size > largest[1]:
-            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        if size is not None and size > largest:
+            faults.append(f"[cell] {name} = {size}: expected at most {coarser}, which is {largest}")
         elif size is not None:
-            largest = name, size
+            coarser, largest = name, size
     return faults + mix_faults(cell)
 
 

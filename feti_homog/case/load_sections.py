@@ -75,14 +75,16 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
     the previous load; before the first load, all stresses are zero.
     """
     state = voigt.PLANE_STATES[plane]
-    unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
+    unloaded = dict.fromkeys((*state.stresses, TEMPERATURE) if state.is_spatial else state.stresses, 0.0)
 
     def after(before: Mapping[str, float], load: Strain | MixedLoad) -> dict[str, float]:
         given, full = named(load), dict[str, float]()
         for names in state.components:
-            source = given if not given.keys().isdisjoint(names) else before
+            source = before if given.keys().isdisjoint(names) else given
             full |= {name: source[name] for name in names if name in source}
-        return full | {name: given.get(name, value) for name, value in before.items() if name == TEMPERATURE}
+        if TEMPERATURE in before:
+            full[TEMPERATURE] = given.get(TEMPERATURE, before[TEMPERATURE])
+        return full
 
     return tuple(accumulate(loads, after, initial=unloaded))[1:]
 

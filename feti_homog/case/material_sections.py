@@ -88,7 +88,7 @@ def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
     """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
-    names, given = [*table] if isinstance(table, dict) else [], dict[str, list[str]]()
+    names, given = list(table) if isinstance(table, dict) else list[str](), dict[str, list[str]]()
     sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
     if isinstance(table, dict) and not sheet.keys() <= FORMS_OF.keys():
         axes = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"
@@ -155,7 +155,7 @@ def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
                 lines.append(f"{section} {name} = {wording.toml_value(value)}: is it in units of 1e-6?")
         moduli = {name: value for name, value in named if value and name.startswith(("young", "E", "G"))}
         if moduli and max(moduli.values()) >= gpa_to_mpa * min(moduli.values()):
-            high, low = (choose(moduli, key=moduli.__getitem__) for choose in (max, min))
+            high, low = max(moduli, key=moduli.__getitem__), min(moduli, key=moduli.__getitem__)
             lines.append(f"{section} {high} {moduli[high]:g}, {low} {moduli[low]:g}: are both in one unit?")
         largest[phase] = float(np.max([*moduli.values(), *np.ravel(vars(material).get("stiffness", 0.0))]))
     matrix = largest.pop(phase_names.MATRIX, 0.0)

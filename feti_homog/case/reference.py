@@ -11,10 +11,8 @@ from feti_homog.errors import CaseError
 from feti_homog.materials import material_forms
 from feti_homog.schema import keys, types, wording
 
-ORDER = (
-    *("name", "cell", "material", *[*sections.SECTIONS][1:]),
-    *("petsc", sections.UNCERTAINTY, sections.SWEEP, sections.UNKNOWN, sections.MEASURED),
-)
+_OF_A_CASE = dict.fromkeys(("name", "cell", "material", *sections.SECTIONS, "petsc"))  # each once
+ORDER = (*_OF_A_CASE, sections.UNCERTAINTY, sections.SWEEP, sections.UNKNOWN, sections.MEASURED)
 """Sections in the order of the reference."""
 
 WIDTH = 100  # characters of a printed line
@@ -71,6 +69,7 @@ UNCERTAINTY_MEANING = (
     "scatter of numbers, which `feti-homog uncertainty` propagates to constants, onsets and peaks, to first order. "
     "`feti-homog run` refuses this section."
 )
+RANGE_MEANING = "Values of a key that lie between two ends."
 NAME = KeyRow("name", types.text.expected, "", "the file's name", "", "Name of the case.")
 PETSC_OPTION = KeyRow(
     "feti_OPTION", sections.OPTION_EXPECTED, "", "", "",
@@ -105,17 +104,16 @@ def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(sections.UNCERTAINTY, f"[{sections.UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
         _table(sections.SectionTable(sections.SWEEP, f"[{sections.SWEEP}]", sections.SweepSection), AXIS),
-        TableReference(
-            sections.SWEEP, f"a range in [{sections.SWEEP}]", "Values of a key that lie between two ends.", ranges
-        ),
+        TableReference(sections.SWEEP, f"a range in [{sections.SWEEP}]", RANGE_MEANING, ranges),
     ]
     references.sort(key=lambda table: ORDER.index(table.section))
     if not word or word in ORDER:
         return [table for table in references if word in ("", table.section)]
     found = []
     for table in references:
-        at = table.section, table.place
-        rows = table.rows if _has(word, *at) else [r for r in table.rows if _has(word, *vars(r).values())]
+        rows = table.rows
+        if not _has(word, table.section, table.place):
+            rows = tuple(row for row in table.rows if _has(word, *vars(row).values()))
         if rows or _has(word, table.meaning):
             found.append(replace(table, rows=tuple(sorted(rows, key=lambda row: not _has(word, row.key)))))
     if not found and not results:

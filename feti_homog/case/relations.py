@@ -33,12 +33,13 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
             loads = load_sections.completed(tuple(placed.values()), plane)
             repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
-            formers = "zero, where the path begins", *[*placed][:-1]
+            formers = ["zero, where the path begins", *list(placed)[:-1]]
             for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
                 value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry
                 noun = "load" if isinstance(value, dict) else "strain"
-                line = f"[path] {place} = {wording.toml_value(value)}: expected a {noun} other than {former}"
-                faults += [line] * is_repeat
+                if is_repeat:
+                    given = f"[path] {place} = {wording.toml_value(value)}"
+                    faults.append(f"{given}: expected a {noun} other than {former}")
         if path.increments is not None and path.increments < len(placed):
             faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
     for kind, section in (("load", load), ("path", path)):
@@ -67,7 +68,8 @@ def axes_lines(
     of_loads = engineering_constants.axes_line(section.plane if isinstance(section, load_sections.Envelope) else loaded)
     phases = [f"[material.{name}]" for name, m in materials.items() if isinstance(m, material_forms.Orthotropic)]
     lines = [f"[{kind}] {of_loads}"] if of_loads else []
-    lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
+    if phases:
+        lines.append(f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3")
     return (". ".join(lines),) if lines else ()
 
 
@@ -149,8 +151,8 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
         return {}
     points = list(zip(openings, tractions, strict=True))
     area = sum((there[0] - here[0]) * (there[1] + here[1]) / 2 for here, there in pairwise(points))
-    numbers = tractions[0] / openings[0], tractions[0], area + openings[0] * tractions[0] / 2
-    names = STIFFNESSES[0], COHESIVE[0], COHESIVE[2]
+    numbers = (tractions[0] / openings[0], tractions[0], area + openings[0] * tractions[0] / 2)
+    names = ("normal_stiffness", "normal_strength", "normal_toughness")
     return {name: number for name, number in zip(names, numbers, strict=True) if getattr(interface, name) is None}
 
 
@@ -163,10 +165,10 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
     if law.softens:
         needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
         line = f"law = {wording.toml_value(law.name)} needs a finite one"
-        faults = [f"{name}: {line}" for name in filter(table.__contains__, needed)]
+        faults = [f"{name}: {line}" for name in needed if name in table]
         faults += _branch_faults(interface)
         yield from faults
-        for kind in ("normal", "tangential") if not (faults or needed) else ():
+        for kind in () if faults or needed else ("normal", "tangential"):
             names = (f"{kind}_{name}" for name in ("stiffness", "strength", "toughness"))
             stiffness, strength, toughness = (getattr(interface, name) for name in names)
             if None in (stiffness, strength, toughness):
@@ -208,5 +210,6 @@ def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
     else:
         bare = replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None)
         for name, number in _of_branch(bare).items():
-            if not math.isclose(given := getattr(interface, name), number, rel_tol=SAME):
+            given = getattr(interface, name)
+            if not math.isclose(given, number, rel_tol=SAME):
                 yield f"{name} = {given:g}: expected {number:g}, as from openings and tractions, or no value"

@@ -66,7 +66,7 @@ class Rule:
                     matches += [(name, f"{place}[{k}]", item) for k, item in enumerate(parent[: types.MOST_ROWS])]
                 elif isinstance(parent, dict) and step in parent:
                     matches.append((name, f"{place}.{step}" if place else step, parent[step]))
-        faulty = (match for match in matches if not (match[2] is None or (self.holds and self.holds(match[2]))))
+        faulty = (match for match in matches if match[2] is not None and not (self.holds and self.holds(match[2])))
         for count, (section, place, value) in enumerate(faulty):
             words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
             shown = wording.toml_value(value) if count <= MOST_FAULTS else ""  # others are only counted
@@ -74,7 +74,7 @@ class Rule:
             if self.names:
                 above, names = f"{place}." if place else "", [name for name in self.names if name in value]
                 subject = f" {', '.join(above + name for name in names or self.names)}"
-            yield f"[{section}]{subject}{words}" if self.path else words[2:]
+            yield f"[{section}]{subject}{words}" if self.path else words.removeprefix(": ")
 
 
 def has(table: Any, *names: str) -> bool:
@@ -181,7 +181,7 @@ def _files() -> Iterator[Rule]:
     files = {MESH: (kinds.MESH_FILE, [*kinds.MESH_SUFFIXES]), PIXELS: (kinds.IMAGE_FILE, [*kinds.IMAGE_SUFFIXES])}
     for condition, (words, _) in files.items():
         yield needed(CELL, "file", f"missing; expected the name of a {words}", condition)
-    files[TABLE] = ".csv file", [*kinds.TABLE_SUFFIXES]
+    files[TABLE] = (".csv file", [*kinds.TABLE_SUFFIXES])
     for condition, (words, suffixes) in files.items():
         others = {suffix for _, some in files.values() for suffix in some} - {*suffixes}
         yield _refused("file", types.file_name("", *others), f"the name of a {words}", condition)
@@ -219,13 +219,14 @@ def _bonds() -> Iterator[Rule]:
     yield Rule((), opens, line, (kinds.ANALYSIS_TYPE.among("stiffness", "load"), MESHED))
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
 
-    def never_break(table: Any) -> bool:
-        return all(has(table, name) and table[name] in (math.inf, types.INF) for name in COHESIVE[:2])
+    def has_constant(key: str, table: Any) -> bool:
+        never_break = all(has(table, name) and table[name] in (math.inf, types.INF) for name in COHESIVE[:2])
+        return not isinstance(table, dict) or key in table or never_break
 
-    for law, name in ((entry, name) for entry in REGISTRY for name in entry.needs):
-        rule, when = needed(INTERFACE, name, ""), (kinds.BREAKING, kinds.CRITERION.among(law.name))
-        holds = partial(lambda rule, table: rule.holds(table) or never_break(table), rule)
-        yield replace(rule, holds=holds, words=partial(law.missing, name), when=when)
+    for law in REGISTRY:
+        when = (kinds.BREAKING, kinds.CRITERION.among(law.name))
+        for name in law.needs:
+            yield Rule(INTERFACE, partial(has_constant, name), partial(law.missing, name), when, (name,))
     type_ = kinds.ENVELOPE_ANALYSIS.in_words("")
     yield needed((), "interface", f"[interface]: missing section; {type_} needs it", kinds.ENVELOPE_ANALYSIS)
     for plane, names in ((kinds.IN_THE_PLANE, STRENGTHS[:2]), (kinds.GENERALIZED, STRENGTHS)):

@@ -61,7 +61,7 @@ LABELS = types.ValueType(
     'a table of phases, one of them matrix, by number from 0 to 65535, such as {0 = "matrix", 255 = "fibre"}',
     lambda v: (
         isinstance(v, dict)
-        and all(re.fullmatch("0|[1-9][0-9]{0,4}", k) and int(k) < 1 << 16 for k in v)
+        and all(re.fullmatch("0|[1-9][0-9]{0,4}", k) and int(k) <= 65535 for k in v)
         and all(name == phase_names.VOID or phase_names.PHASE.fullmatch(str(name)) for name in v.values())
         and phase_names.MATRIX in v.values()
     ),
@@ -82,9 +82,9 @@ KEPT = types.integer(least=2, most=10**9)
 STATES = types.either(f'"all", "peaks" or {KEPT.expected}', types.choice("all", "peaks"), KEPT)
 PAIR = types.list_of(types.text, 'the names of two phases, such as ["coating", "matrix"]', count=2, unique=True)
 _UNLIMITED = replace(types.POSITIVE_OR_INF, store=lambda value: None if math.isinf(float(value)) else float(value))
-STRENGTH, STIFFNESS, CONDUCTANCE = (
-    replace(_UNLIMITED, expected=f"{noun} above 0, or inf") for noun in ("a traction", "a stiffness", "a conductance")
-)
+STRENGTH = replace(_UNLIMITED, expected="a traction above 0, or inf")
+STIFFNESS = replace(_UNLIMITED, expected="a stiffness above 0, or inf")
+CONDUCTANCE = replace(_UNLIMITED, expected="a conductance above 0, or inf")
 TOUGHNESS = replace(types.real(above=0.0), expected="an energy per area above 0")
 NUMBERS_ABOVE = types.list_of(types.real(least=0.0), "a list of two numbers or more, none below 0", least=2, most=1000)
 _ANGLES = types.list_of(
@@ -102,10 +102,10 @@ MECHANICAL = ANALYSIS_TYPE.among("stiffness", "angle", "path", "load", "envelope
 CONDUCTIVITY = ANALYSIS_TYPE.among("conductivity")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
-BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (
-    CRITERION.among(*laws_with(key))
-    for key in ("toughness", "normal_strength", "axial_strength", "mixing_exponent", "openings")
-)
+BY_ENERGY, BY_TABLE = CRITERION.among(*laws_with("toughness")), CRITERION.among(*laws_with("openings"))
+BY_STRENGTH = CRITERION.among(*laws_with("normal_strength"))
+BY_AXIAL_STRENGTH = CRITERION.among(*laws_with("axial_strength"))
+SOFTENING = CRITERION.among(*laws_with("mixing_exponent"))
 
 IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")

@@ -44,9 +44,12 @@ def read_document(path: str | Path) -> dict[str, Any]:
         words, number = words.replace("end of document", place), re.search(r"at line (\d+), col", str(error))
         text = content.split("\n")[int(number[1]) - 1].strip() if number else ""
         hint = "; numbers have no unit, and a decimal point" if re.match(r"[^=]*=\s*[-+.]*\d[^=]*$", text) else ""
-        hint = "; text needs quotation marks, true and false do not" if re.match(r"[^=]*=\s*[A-Za-z]", text) else hint
-        hint = f"; {text.partition('=')[0].strip()} is given twice" if "overwrite" in words else hint
-        raise CaseError(f"{path}: not TOML: {words}{f': {wording.toml_value(text)}{hint}' if text else ''}") from None
+        if "overwrite" in words:
+            hint = f"; {text.partition('=')[0].strip()} is given twice"
+        elif re.match(r"[^=]*=\s*[A-Za-z]", text):
+            hint = "; text needs quotation marks, true and false do not"
+        quoted = f": {wording.toml_value(text)}{hint}" if text else ""
+        raise CaseError(f"{path}: not TOML: {words}{quoted}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     # Without a UTF-8 locale, Python escapes the bytes of file names.
@@ -64,9 +67,8 @@ def to_document(values: object) -> dict[str, Any]:
         CaseError: a key is not a string, an integer is too large for messages, or a table or list is too long or deep.
     """
     if not isinstance(values, Mapping):
-        raise TypeError(
-            f"expected the sections of a case as a dictionary, such as tomllib.load returns; got {_article(values)}"
-        )
+        expected = "expected the sections of a case as a dictionary, such as tomllib.load returns"
+        raise TypeError(f"{expected}; got {_article(values)}")
     faults: list[str] = []
     document: dict[str, Any] = _to_toml(values, (), faults)
     if faults:

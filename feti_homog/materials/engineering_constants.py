@@ -114,10 +114,11 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
 
 def along_axes(S: Array) -> dict[str, Any]:
     """Tabulate the moduli and ratios of a compliance, (3, 3) or (6, 6), along the axes of the cell."""
-    normal, pairs = (2, ((0, 1), (1, 0))) if len(S) == 3 else (3, ((0, 1), (0, 2), (1, 2)))
-    table = {f"E{i + 1}": 1 / S[i, i] for i in range(normal)}
+    is_plane = len(S) == 3
+    pairs = ((0, 1), (1, 0)) if is_plane else ((0, 1), (0, 2), (1, 2))
+    table = {f"E{i + 1}": 1 / S[i, i] for i in range(2 if is_plane else 3)}
     table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
-    shears = ("G12",) if normal == 2 else ("G12", "G13", "G23")
+    shears = ("G12",) if is_plane else ("G12", "G13", "G23")
     return table | {name: 1 / S[-k, -k] for k, name in enumerate(shears, 1)}
 
 
@@ -237,7 +238,7 @@ def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
     pulled = np.stack([c * c, s * s, zero, zero, zero, c * s])
     sheared = np.stack([-2 * c * s, 2 * c * s, zero, zero, zero, c * c - s * s])
     E, G = (1 / np.einsum("in,ij,jn->n", stress, compliance, stress) for stress in (pulled, sheared))
-    return TransverseModuli(*(float(value) for value in (E.min(), E.max(), G.min(), G.max())))
+    return TransverseModuli(float(E.min()), float(E.max()), float(G.min()), float(G.max()))
 
 
 CELL_AXES = "axes of the cell, x3 along the fibres"
@@ -289,8 +290,10 @@ _READ_EITHER_WAY = {
 
 def axes_line(names: Iterable[str]) -> str:
     """Describe the axes of names with another meaning in a ply, such as `S12`; '' without such names."""
-    bare = dict.fromkeys(name.rpartition("_")[2] for name in names)
-    return ". ".join(
-        f"{name} is {kind} {way} the fibres; {ALONG if way == ACROSS else ACROSS} them {others}"
-        for name, (kind, way, others) in ((name, _READ_EITHER_WAY[name]) for name in bare if name in _READ_EITHER_WAY)
-    )
+    lines = []
+    for name in dict.fromkeys(name.rpartition("_")[2] for name in names):
+        if name in _READ_EITHER_WAY:
+            kind, way, others = _READ_EITHER_WAY[name]
+            other_way = ALONG if way == ACROSS else ACROSS
+            lines.append(f"{name} is {kind} {way} the fibres; {other_way} them {others}")
+    return ". ".join(lines)

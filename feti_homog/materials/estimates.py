@@ -34,7 +34,7 @@ def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates
         able &= OF_SEVERAL_KINDS
     if not all(map(engineering_constants.is_transversely_isotropic, [matrix, *(f.constants for f in fibres)])):
         able.clear()
-    return Estimates(**{n: method(matrix, fibres) if n in able else NOTHING for n, method in METHODS.items()})
+    return Estimates(**{name: method(matrix, fibres) if name in able else NOTHING for name, method in METHODS.items()})
 
 
 def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
@@ -66,9 +66,10 @@ def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     root, along = math.sqrt(c), _in_parallel(matrix, fibres)
     pairs = ((getattr(matrix, name), getattr(fibre, name)) for name in MODULI_ACROSS)
     E, G, G_axial = (of_matrix / (1 - root * (1 - of_matrix / of_fibre)) for of_matrix, of_fibre in pairs)
-    if (of_fibre := phase_bounds.expansions(fibre)) and (of_matrix := phase_bounds.expansions(matrix)):
-        restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * of_matrix[0]
-        along["expansion_transverse"] = root * of_fibre[1] + (1 - root) * (of_matrix[1] + restrained)
+    fibre_strains, matrix_strains = phase_bounds.expansions(fibre), phase_bounds.expansions(matrix)
+    if fibre_strains is not None and matrix_strains is not None:
+        restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * matrix_strains[0]
+        along["expansion_transverse"] = root * fibre_strains[1] + (1 - root) * (matrix_strains[1] + restrained)
     return Estimate(**along, E_transverse=E, nu_transverse=E / (2 * G) - 1, G_axial=G_axial, G_transverse=G,
                     K_transverse=None)  # fmt: skip
 

@@ -82,10 +82,11 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
     Transversely isotropic constants count as isotropic up to ISOTROPY.  Raises ValueError as `transverse_ratio` does.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
-        young, ratio, shear = material.E_transverse, transverse_ratio(material), material.G_axial
-        pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
-        compared = pairs if shear is not None else pairs[:2]
-        alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in compared)
+        young, ratio = material.E_transverse, transverse_ratio(material)
+        pairs = [(material.E_axial, young), (material.nu_axial, ratio)]
+        if material.G_axial is not None:
+            pairs.append((material.G_axial, young / (2 + 2 * ratio)))
+        alike = all(axial is not None and math.isclose(axial, across, rel_tol=ISOTROPY) for axial, across in pairs)
         return ratio if alike else None
     return material.poisson if isinstance(material, material_forms.Isotropic) else None
 
@@ -106,9 +107,8 @@ def spatial_stiffness(material: material_forms.Material) -> Float:
         if len(stiffness) == 3:
             raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 serves one plane state only")
         return stiffness
-    return voigt.rotated(
-        np.asarray(np.linalg.inv(stable_compliance(material, voigt.GENERALIZED.name)), float), _angle(material)
-    )
+    compliance = stable_compliance(material, voigt.GENERALIZED.name)
+    return voigt.rotated(np.asarray(np.linalg.inv(compliance), float), _angle(material))
 
 
 def expansion(material: material_forms.Material) -> Float | None:
@@ -141,8 +141,8 @@ def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, 
     # E33 = row . [S11, S22, S12] + S33 / young
     material = _elastic(material)
     if isinstance(material, material_forms.Isotropic):
-        ratio = -material.poisson / material.young
-        row, young = np.array([ratio, ratio, 0.0]), material.young
+        contraction = -material.poisson / material.young
+        row, young = np.array([contraction, contraction, 0.0]), material.young
     elif isinstance(material, material_forms.General):
         stiffness = _checked_stiffness(material)
         compliance = np.full((6, 6), np.nan) if len(stiffness) == 3 else np.linalg.inv(stiffness)
@@ -235,8 +235,9 @@ def missing_constants(form: type[Any], names: Collection[str], plane: str) -> li
     if form is material_forms.TransverselyIsotropic and not {"nu_transverse", "G_transverse"} & {*names}:
         faults.append("nu_transverse, G_transverse: missing; expected one")
     of_strain, of_space, hint = NEEDED.get(form, ((), (), ""))
-    needed = of_strain + of_space if state.is_spatial else () if state.is_sheet else of_strain
-    if absent := [name for name in needed if name not in names]:
+    needed = of_strain + of_space if state.is_spatial else of_strain
+    absent = [] if state.is_sheet else [name for name in needed if name not in names]
+    if absent:
         faults.append(f"{', '.join(absent)}: missing; {state.title} needs {'it' if len(absent) == 1 else 'them'}{hint}")
     return faults
 

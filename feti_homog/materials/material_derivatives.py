@@ -50,15 +50,16 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
         return
-    is_general = isinstance(material, material_forms.General)
-    for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
+    changes = _of_entries if isinstance(material, material_forms.General) else _of_constants
+    for name, value, change in changes(material, plane, C):
         yield LawChange(name, value, change, none)
     free = expansion(material)
+    angle = 0.0
     if isinstance(material, material_forms.Orthotropic):
-        turn = TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK]
-        yield LawChange("angle", material.angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
+        angle, turn = material.angle, TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK]
+        yield LawChange("angle", angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
     if len(C) == 6 and free is not None:
-        to_cell = strain_rotation(-material.angle if isinstance(material, material_forms.Orthotropic) else 0.0)[:, :3]
+        to_cell = strain_rotation(-angle)[:, :3]
         if isinstance(material.expansion, tuple):
             terms = [(f"expansion.{k + 1}", value, np.eye(3)[k]) for k, value in enumerate(material.expansion)]
         elif material.expansion is not None:
@@ -78,8 +79,8 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
     turn = strain_rotation(-getattr(material, "angle", 0.0))
     turn = turn if len(C) == 6 else turn[IN_PLANE_BLOCK]
     for name, value in values.items():
-        moved = {other: complex(constant, STEP * (other == name)) for other, constant in values.items()}
-        varied = replace(material, **moved)
+        moved = {other: complex(constant) for other, constant in values.items()}
+        varied = replace(material, **moved | {name: complex(value, STEP)})
         if isinstance(varied, material_forms.Isotropic):
             named = {entry: getattr(varied, key) for entry, key in ISOTROPIC_COMPLIANCE.items()}
             varied = material_forms.TransverselyIsotropic(**named, G_axial=varied.young / (2 * (1 + varied.poisson)))

@@ -192,7 +192,7 @@ def aligned_cylinders(
     k, nu, E, m, p = np.array(
         [[x.K_transverse, x.nu_axial, x.E_axial, x.G_transverse, x.G_axial] for x in phases], dtype=float
     ).T
-    across, along, x = 2 * nu * k, E + 4 * nu**2 * k, k + m0
+    across, along, x = 2 * nu * k, E + 4 * nu**2 * k, k + m0  # l, n and x
     h = k0 * m0 / (k0 + 2 * m0)
     stiff = 1 / np.sum(c / x)  # k* + m0
     bulk, shear = stiff - m0, dispersed(c, m, h)
@@ -269,8 +269,8 @@ def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy
     """
 
     def extreme(pick: Callable[[Iterable[float]], float]) -> tuple[float, float, float]:
-        k, m, p = ([getattr(x, name) for x in phases] for name in ("K_transverse", "G_transverse", "G_axial"))
-        return pick(k), pick(m), pick(p)
+        k, m = pick(phase.K_transverse for phase in phases), pick(phase.G_transverse for phase in phases)
+        return k, m, pick(phase.G_axial for phase in phases)
 
     lower, upper = (aligned_cylinders(fractions, phases, extreme(pick)) for pick in (min, max))
     nu = min(lower.nu_axial, upper.nu_axial), max(lower.nu_axial, upper.nu_axial)

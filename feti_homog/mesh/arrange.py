@@ -64,13 +64,14 @@ def random_arrangement(
         radii[members] *= sqrt(share / (pi * fsum(radii[members] ** 2)))
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     void_radius = float(radii.mean()) * (1.0 if cell.void_radius is None else cell.void_radius)
-    if voids := max(1, round(cell.voids / (pi * void_radius**2))) if cell.voids else 0:
+    if cell.voids:
+        voids = max(1, round(cell.voids / (pi * void_radius**2)))
         if voids > types.MOST_FIBRES:
             bound = f"expected at most {types.MOST_FIBRES}; make void_radius larger"
             raise MeshError(f"[cell] {cell_sizes.fractions_in_words(cell)}: makes {voids:.2g} voids; {bound}")
-        void_radii = np.full(voids, sqrt((cell.voids or 0.0) / (pi * voids)))
-        radii, coating = np.append(radii, void_radii), np.append(coating, np.zeros(voids))
-    count, phase = len(radii), phase + (phase_names.VOID,) * voids
+        radii = np.append(radii, np.full(voids, sqrt(cell.voids / (pi * voids))))
+        coating, phase = np.append(coating, np.zeros(voids)), phase + (phase_names.VOID,) * voids
+    count = len(radii)
     grown = radii + coating + clear
     ask = f"[cell] {cell_sizes.fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"

@@ -72,8 +72,8 @@ def fibre_circles(torus: Torus) -> Float:
     inside = np.flatnonzero((not_round & ~reaches_side)[torus.constituent])
     triangles, body = mesh.triangles[inside], torus.constituent[inside]
     weights, middles = areas(mesh.points, triangles), sum(mesh.points[k] for k in triangles.T) / triangles.shape[1]
-    area, *moments = (np.bincount(body, weights * x, n) for x in (1.0, *middles.T))
-    circles[area > 0, :2] = (np.array(moments)[:, area > 0] / area[area > 0]).T
+    area, moments = np.bincount(body, weights, n), np.array([np.bincount(body, weights * x, n) for x in middles.T])
+    circles[area > 0, :2] = (moments[:, area > 0] / area[area > 0]).T
     for submesh in cut_bodies(torus, np.flatnonzero((not_round & reaches_side)[torus.constituent])):
         shift, closes = unwrap(submesh)
         if closes:

@@ -161,10 +161,10 @@ class Torus:
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
         one, other, edge = self.sides
-        between, edge_ends = edge[self.constituent[one] != self.constituent[other]], self.edge_ends
+        between, n = edge[self.constituent[one] != self.constituent[other]], len(self.class_keys)
         alone = np.bincount(self.triangle_torus_edges.ravel()) == 1
-        ends = (edge_ends[some].ravel() for some in (between, alone))
-        shared, free = (np.bincount(classes, minlength=len(self.class_keys)) for classes in ends)
+        shared = np.bincount(self.edge_ends[between].ravel(), minlength=n)
+        free = np.bincount(self.edge_ends[alone].ravel(), minlength=n)
         # Each edge between constituents ends a sector; two edges at a void, or at the outside, together end one.
         sectors = shared + free // 2
         return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
@@ -270,17 +270,17 @@ def renumber(label: Int, order: Int) -> Int:
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
     """Find the plane edges: `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
-    start, stop, n = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel(), len(mesh.points)
-    sides = np.minimum(start, stop), np.maximum(start, stop)
+    start, stop = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel()
+    low, high, n = np.minimum(start, stop), np.maximum(start, stop), len(mesh.points)
     # Sides in ascending order of the lower node, then of the other: sparse matrices sort faster than `np.unique`.
-    by_low = csc_matrix((sides[1], sides[0], np.arange(start.size + 1)), shape=(n, start.size)).tocsr()
+    by_low = csc_matrix((high, low, np.arange(start.size + 1)), shape=(n, start.size)).tocsr()
     order = csr_matrix((by_low.indices, by_low.data, by_low.indptr), shape=(n, n))
     order.sort_indices()
     is_first = np.diff(order.indices, prepend=-1) != 0
     is_first[order.indptr[:-1][np.diff(order.indptr) > 0]] = True
     which, chosen = np.empty(start.size, np.int64), order.data[is_first]
     which[order.data] = np.cumsum(is_first) - 1
-    edges = np.stack([nodes[chosen] for nodes in sides], axis=1).astype(np.int64)
+    edges = np.stack([low[chosen], high[chosen]], axis=1).astype(np.int64)
     (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
     backwards = (xa > xb) | ((xa == xb) & (ya > yb))
     edges[backwards] = edges[backwards, ::-1]

@@ -143,8 +143,8 @@ def halved(pixels: Submesh) -> Submesh:
     sides = np.c_[pixels.triangle_edges, len(pixels.edges) + np.arange(m)]
     # Diagonals follow the edges of all pixels, in the order of the classes of lower left corners.
     keys, place = np.unique(pixels.class_keys[pixels.vertex_class[corners[:, 0]]], return_inverse=True)
-    names = ("circles", "turns", "at_void", "debonded")
-    diagonals = {name: np.zeros((m, *(old := getattr(pixels, name)).shape[1:]), old.dtype) for name in names}
+    arrays = {name: getattr(pixels, name) for name in ("circles", "turns", "at_void", "debonded")}
+    diagonals = {name: np.zeros((m, *array.shape[1:]), array.dtype) for name, array in arrays.items()}
     diagonals |= {"edge_keys": np.iinfo(np.int32).max + keys, "edge_class": len(pixels.edge_keys) + place}
     diagonals["edges"] = np.where(is_odd[:, None] == 1, corners[:, [3, 1]], corners[:, [0, 2]])
     return replace(
@@ -235,7 +235,8 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     by_leaf = np.argsort(leaf)
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)
-    last[node], first[node[::-1]], place[nodes] = of_leaf, of_leaf[::-1], inside
+    first[node[::-1]], last[node] = of_leaf[::-1], of_leaf
+    place[nodes] = inside
     height = np.frexp((first ^ last).astype(float))[1]  # levels from the leaves to the smallest part around a node
     end = (last >> height) + 1 << height
     return np.asarray(np.lexsort((place, height, end)))
@@ -270,9 +271,8 @@ def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
         (order_x, at_x, cost_x), (order_y, at_y, cost_y) = cuts
         by_y = (cost_y < cost_x) & (size > 1)
         order = np.where(by_y[of_place], order_y, order_x)
-        halves = np.empty(2 * len(first) - 1, np.int64)
-        halves[::2], halves[1::2] = first, np.where(size < 2, first[1:], np.where(by_y, at_y, at_x))
-        first = halves
+        middles = np.where(size < 2, first[1:], np.where(by_y, at_y, at_x))
+        first = np.append(np.stack([first[:-1], middles], axis=1), first[-1])
     leaf = np.empty(t, np.int64)
     leaf[order] = np.repeat(np.arange(len(first) - 1), np.diff(first))
     return leaf

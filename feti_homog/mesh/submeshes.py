@@ -200,7 +200,7 @@ def pinned_classes(torus: Torus) -> Int:
     outside = np.zeros(len(torus.class_keys), bool)
     outside[torus.node_class[torus.mesh.triangles[torus.constituent_phase[torus.constituent] > 0]]] = True
     # By preference inside the matrix, else where bodies never part, else inside any body.
-    ((*_, key),) = pinning(torus, np.select([torus.never_part, torus.meeting == 2, outside], [1, 3, 2], 0))
+    [(_, _, key)] = pinning(torus, np.select([torus.never_part, torus.meeting == 2, outside], [1, 3, 2], 0))
     return np.array([key])
 
 

@@ -157,7 +157,7 @@ def read_index(directory: Path) -> SweepIndex:
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**_replaced(entry, types.INF, math.inf)) for entry in document["cases"])
-        texts = document["name"], document["stress_unit"], *(entry.identity for entry in entries)
+        texts = [document["name"], document["stress_unit"], *(entry.identity for entry in entries)]
         counts = [number for e in entries for number in (e.number, e.point, e.realisation)]
         drawn = "cell.fibre_fraction"
         is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)
@@ -186,11 +186,11 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
         return state
-    document, status = None, Status.RUNNING if is_running else Status.WAITING
+    document, status = None, Status.WAITING
     with contextlib.suppress(FetiHomogError):  # no event yet, or an unreadable one, which the next run names
         document = output_folder.latest(folder)
-        status = Status.RUNNING if is_running else Status.INTERRUPTED
-    return CaseState(status, (document or {}).get("unfinished", ""), document)
+        status = Status.INTERRUPTED
+    return CaseState(Status.RUNNING if is_running else status, (document or {}).get("unfinished", ""), document)
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:

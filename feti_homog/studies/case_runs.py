@@ -73,9 +73,9 @@ def run_all(
 
             mpi_errors.on_root_only(comm, reset_failures)
         fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
-        if faults := [fault for fault in comm.allgather(fault) if fault is not None]:
+        if errors := [error for error in comm.allgather(fault) if error is not None]:
             remark = "finished cases are kept; the same command goes on with the others"
-            raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
+            raise FetiHomogError(*dict.fromkeys(line for error in errors for line in error.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
@@ -208,9 +208,8 @@ class CaseRunner:
                     status = f"failed ({error.faults[0]})"
                 except FetiHomogError:  # a file could not be written: the next run computes the case again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
-                        mpi_errors.on_root_only(
-                            self.comm, case_folders.set_aside, self.directory, entry, case_folders.Status.DAMAGED
-                        )
+                        damaged = case_folders.Status.DAMAGED
+                        mpi_errors.on_root_only(self.comm, case_folders.set_aside, self.directory, entry, damaged)
                     raise
                 seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
                 self._print(f"{entry.folder} of {len(self.sweep.entries)}: {status}, {seconds:.2f} s; {inputs}")

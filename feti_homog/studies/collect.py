@@ -45,8 +45,9 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     lines = [*case_folders.failure_lines(failed, index.stress_unit), *means(table)]
     peaks = [landmarks.peak_of(document) for document in table.finished if "path" in document]
     rising = sum("stress_left" not in peak and any(key.startswith("first_") for key in peak) for peak in peaks)
-    of_paths = f"remark: {rising} of {len(peaks)} paths end before their stress falls: load them further for a peak"
-    lines += [of_paths] if rising else []
+    if rising:
+        of_paths = f"{rising} of {len(peaks)} paths end before their stress falls"
+        lines.append(f"remark: {of_paths}: load them further for a peak")
     lines += case_folders.note_lines(index.entries, states)
     rows = zip(table.folder, table.status, table.reason, strict=True)
     begun = [f"  {folder}  {status}; {reason}" for folder, status, reason in rows if status in case_folders.BEGUN]
@@ -67,8 +68,10 @@ def means(table: SweepTable) -> list[str]:
         rows = [[tables.with_unit(name, table.stress_unit), int(count), *moments]
                 for name, (count, *moments) in parts.items() if count > 1]  # fmt: skip
         title = table.label(point) or "All realisations"
-        lines += ["", *tables.Table(title, columns, rows).lines] if rows else []
-        values += [] if rows or not table.results_of(point) else [[title, *(part[1] for part in parts.values())]]
+        if rows:
+            lines += ["", *tables.Table(title, columns, rows).lines]
+        elif table.results_of(point):
+            values.append([title, *(mean for _, mean, *_ in parts.values())])
     heads = [tables.with_unit(name, table.stress_unit) for name in names]
     columns = [tables.Column("", -max([22, *(len(row[0]) + 4 for row in values)]))]
     columns += [tables.Column(head, max(12, len(head) + 2), ".6g") for head in heads]
@@ -98,13 +101,14 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
             if count:
                 statistics.append([*at_point, name, tables.unit(name, table.stress_unit), int(count), *moments])
 
-    def cell(value: Any) -> Any:  # empty for None and NaN, JSON for lists and tables
-        is_nothing = value is None or (isinstance(value, float) and math.isnan(value))
-        return "" if is_nothing else json.dumps(value) if isinstance(value, list | dict) else value
+    def cell(value: Any) -> Any:
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return ""
+        return json.dumps(value) if isinstance(value, list | dict) else value
 
-    texts = [result_json.csv_text(map(cell, row) for row in rows) for rows in (cases, statistics)]
-    return [atomic.replace_text(directory / f"{name}.csv", text)
-            for name, text in zip(("cases", "statistics"), texts, strict=True)]  # fmt: skip
+    files = {"cases.csv": cases, "statistics.csv": statistics}
+    texts = {name: result_json.csv_text(map(cell, row) for row in rows) for name, rows in files.items()}
+    return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
 
 
 def _index_and_states(directory: Path) -> tuple[case_folders.SweepIndex, list[case_folders.CaseState]]:

@@ -161,8 +161,8 @@ def summarize(
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
     """Return a message for each undetermined direction, with the unknowns in its row of `rows` (indices of `names`)."""
-    reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
-    return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
+    alone, together = "no measured value depends on it", "the measured values do not determine them together"
+    return [f"[unknown] {', '.join(names[k] for k in row)}: {alone if len(row) == 1 else together}" for row in rows]
 
 
 def _sizes(x: Float) -> Float:
@@ -184,7 +184,8 @@ def fit_document(
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
         faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
-    faults += [] if misfits else names_of(estimates.undetermined, [*unknowns])
+    else:
+        faults += names_of(estimates.undetermined, [*unknowns])
     cure = f"; {steps} makes the curve a staircase: more teeth (softening_tolerance) make it smooth" if steps else ""
     faults = [f"{fault}{cure}" for fault in faults]
     faults += [

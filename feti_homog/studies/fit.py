@@ -236,13 +236,13 @@ class Evaluations:
         name = self.folders[key].replace("evaluation", "differences")
         answers = iter(self._ask(name, [(test, point) for point in ends for test in tests]) if ends else ())
         self.computed |= {point: np.concatenate([next(answers)[1] for _ in tests]) for point in ends}
-        for (k, side), widest in ((pair, 0.1 * widths[pair[0]]) for pair in steps):
+        for (k, side), step in steps.items():
+            widest = 0.1 * widths[k]
             with suppress(CaseError, ConvergenceError):
-                while abs(step := steps[k, side]) < widest and np.all(
-                    abs(self.computed[end(k, step)] - centre) <= noise
-                ):
-                    self.values(np.array(end(k, wider := side * min(2.0 * abs(step), widest))))
-                    steps[k, side] = wider
+                while abs(step) < widest and np.all(abs(self.computed[end(k, step)] - centre) <= noise):
+                    step = side * min(2.0 * abs(step), widest)
+                    self.values(np.array(end(k, step)))
+                    steps[k, side] = step
         for k in inexact:
             low, high = (end(k, steps[k, side]) for side in (-1, 1))
             change = self.computed[high] - self.computed[low]

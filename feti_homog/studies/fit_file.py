@@ -51,7 +51,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
                 changes |= [case.digest() for case in fit.at([*start[:k], end, *start[k + 1 :]]).cases] != digests
             except CaseError as error:
                 lines += [f"[{sections.UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
-        faults += lines if changes or lines else [f"[{sections.UNKNOWN}] {name}: no measured value depends on it"]
+        if not (changes or lines):
+            lines.append(f"[{sections.UNKNOWN}] {name}: no measured value depends on it")
+        faults += lines
     if faults:
         raise CaseError(*dict.fromkeys(faults))
     return fit
@@ -77,9 +79,8 @@ class FitReader:
                 unknowns[path] = unknown
                 if not unknown.lower < unknown.upper or not unknown.lower <= unknown.start <= unknown.upper:
                     bounds = f"lower = {unknown.lower:g}, start = {unknown.start:g}, upper = {unknown.upper:g}"
-                    self.faults.append(
-                        f"[{sections.UNKNOWN}] {name}: {bounds}: expected lower <= start <= upper, lower < upper"
-                    )
+                    expected = "expected lower <= start <= upper, lower < upper"
+                    self.faults.append(f"[{sections.UNKNOWN}] {name}: {bounds}: {expected}")
         return unknowns
 
     def tests(
@@ -87,9 +88,8 @@ class FitReader:
     ) -> tuple[list[Assignment], list[Datum]]:
         """Read the case changes of all tests, and their readable measured values.  Faults go to `faults`."""
         if (measured is None) == (tests is None):
-            self.faults.append(
-                f"expected [{sections.MEASURED}] for one test or [[{sections.TEST}]] for each of several, with measured"
-            )
+            several = f"[[{sections.TEST}]] for each of several, with measured"
+            self.faults.append(f"expected [{sections.MEASURED}] for one test or {several}")
             return [], []
         rows = [{sections.MEASURED: measured}] if tests is None else tests
         if not isinstance(rows, list) or len(rows) > types.MOST_SECTIONS or {*map(type, rows)} - {dict}:

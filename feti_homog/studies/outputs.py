@@ -64,9 +64,10 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         first, second = document["case"]["envelope"]["plane"]
         factors = sorted(point["factor"] for point in envelope if "factor" in point)
         values |= {f"envelope_{first}": point["factor"] for point in envelope[:1] if "factor" in point}
-        values |= {f"envelope_least_{first}_{second}": factors[0]} if factors else {}
-        is_closed = len(factors) == len(envelope)
-        values |= {f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {}
+        if factors:
+            values[f"envelope_least_{first}_{second}"] = factors[0]
+        if len(factors) == len(envelope):  # every direction has an onset
+            values[f"envelope_largest_{first}_{second}"] = factors[-1]
     if (load := document.get("load")) is not None:
         values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
     values |= _phases(document)

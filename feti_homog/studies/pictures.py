@@ -61,14 +61,14 @@ def moduli_figure(table: SweepTable) -> Figure:
     series = series_over(table, FRACTION)[: len(MARKERS)]
     ratios = RATIOS if panels_of(table) == SPATIAL_PANELS else ()
     names = [*panels_of(table), *(name for name in ratios if name in table.outputs)]
-    rows = -(-len(names) // 2)
+    rows = (len(names) + 1) // 2
     picture = Figure(figsize=(7.2, 2.6 * rows + 0.8), layout="constrained")
     panels = picture.subplots(rows, 2, sharex=True, squeeze=False).ravel()
     for axes, name in zip(panels, names, strict=False):
         for number, one_series in enumerate(series):
             _plot_series(axes, table, one_series, name, number)
         unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
-        shear = r" ($\gamma_{12}$)" * (name == "C33" and names == [*PANELS])
+        shear = r" ($\gamma_{12}$)" if name == "C33" and names == [*PANELS] else ""
         axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}{shear}\n{unit}".rstrip())
         _limit(axes)
         plot_helpers.faint_grid(axes)
@@ -98,9 +98,9 @@ def _limit(axes: Axes) -> None:
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
     """Return bounds by output name: by Reuss and Voigt for C11 and C33, else by Hashin and Shtrikman, or Hill."""
     bounds = document.get("bounds") or {}
-    ends, forms = [bounds[name] for name in ("reuss", "voigt") if bounds], document.get("conductivity_estimates") or {}
+    forms, ends = document.get("conductivity_estimates") or {}, [bounds["reuss"], bounds["voigt"]] if bounds else []
     pairs: dict[str, Any] = {f"C{k + 1}{k + 1}": tuple(end[k][k] for end in ends) for k in (0, 2) if ends}
-    pairs |= dict.fromkeys(CONDUCTION[:2], forms.get("hashin_shtrikman"))
+    pairs |= dict.fromkeys(("k11", "k22"), forms.get("hashin_shtrikman"))
     pairs |= (bounds.get("hashin_shtrikman") or {}) | (document.get("fibre_bounds") or {})
     return {name: pair for name, pair in pairs.items() if pair is not None}
 
@@ -117,9 +117,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, numbe
     for x, point in zip(series.x, series.points, strict=True):
         rows = table.rows(point)
         if len(rows) > 1:
-            axes.plot(
-                [x] * len(rows), values[rows], marker, color=colour, ms=3.5, alpha=0.4, mew=0, label="realisations"
-            )
+            faint: dict[str, Any] = {"ms": 3.5, "alpha": 0.4, "mew": 0, "label": "realisations"}
+            axes.plot([x] * len(rows), values[rows], marker, color=colour, **faint)
     limits = [[bounds_of(result).get(name, (np.nan, np.nan)) for result in table.results_of(p)] for p in series.points]
     ends = np.array([np.mean(pairs, axis=0) for pairs in limits])
     if np.isfinite(ends).any():
@@ -152,7 +151,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]
-    count, unit = bool(single) + bool(points), plot_helpers.stress_unit(results[0]["case"]) if results else ""
+    count, unit = 2 if single and points else 1, plot_helpers.stress_unit(results[0]["case"]) if results else ""
     figure = Figure(figsize=(6.5 * count, 4.5), layout="constrained")
     panels = figure.subplots(1, count, squeeze=False)[0]
     if single:
@@ -188,10 +187,10 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
         panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())
         panels[-1].locator_params(axis="x", nbins=6)
         plot_helpers.finish_curves(panels[-1])
-    title, case = f"{document['name']}: computed and measured", results[0]["case"] if results else {}
-    stress = case.get("output", {}).get("stress_unit", "")
+    stress = results[0]["case"].get("output", {}).get("stress_unit", "") if results else ""
+    title = f"{document['name']}: computed and measured"
     for name, number in document.get("unknowns", {}).items():
-        title += f"\n{tables.with_unit(name, stress)} = {number['estimate']:.5g}"
-        title += f" ± {number['std']:.2g}" if number["std"] else ""
+        deviation = f" ± {number['std']:.2g}" if number["std"] else ""
+        title += f"\n{tables.with_unit(name, stress)} = {number['estimate']:.5g}{deviation}"
     figure.suptitle(plot_helpers.plain(title))
     return figure

@@ -79,8 +79,8 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
         yield "expected an analysis of type path, of one leg"
         return
     target = case.targets[0]
-    loads = [(strain, name, target[name]) for strain, stress in state.components for name in (strain, stress)
-             if target.get(name)]  # fmt: skip
+    strain_of = {name: strain for strain, stress in state.components for name in (strain, stress)}
+    loads = [(strain, name, target[name]) for name, strain in strain_of.items() if target.get(name)]
     is_strain = bool(loads) and all(name == strain for strain, name, _ in loads)
     if unknown or not (is_strain or len(loads) == 1):
         return
@@ -158,8 +158,8 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
             column = dict(zip(sensitivities["constants"], values, strict=True))
             return np.array([column[datum.name] for datum in data])
         section, idle = name.partition(".")[0], ("strength", "toughness")
-        is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
-        return np.zeros(len(data)) if is_idle else None
+        is_idle = {"material": ".expansion" in name, "interface": name.endswith(idle)}
+        return np.zeros(len(data)) if is_idle.get(section) else None
     key, case = name.removeprefix("interface."), document["case"]
     is_alike = case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
     is_alike |= case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None

@@ -40,11 +40,10 @@ class SweepCase:
 
     def describe(self, stress_unit: str) -> str:
         """Return a line with the inputs of the case and their units."""
-        values = [
-            (f"{name} = {wording.toml_value(value)}", tables.unit(name, stress_unit))
-            for name, value in self.inputs.items()
-        ]
-        return ", ".join(f"{text} {label}".rstrip() for text, label in values)
+        texts = []
+        for name, value in self.inputs.items():
+            texts.append(f"{name} = {wording.toml_value(value)} {tables.unit(name, stress_unit)}".rstrip())
+        return ", ".join(texts)
 
 
 @dataclass(frozen=True)

@@ -79,12 +79,11 @@ class SweepTable:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """The statistics of each output over the finished realisations of each point."""
-        statistics = {}
+        statistics, is_finished = {}, np.array([document is not None for document in self.documents])
         for name, values in self.outputs.items():
-            finished = np.array([document is not None for document in self.documents])
-            values = np.where(finished, values, np.nan)
-            samples = [Statistics.of(values[self.rows(point)]) for point in self.points]
-            statistics[name] = Statistics(*(np.array([getattr(each, part) for each in samples]) for part in PARTS))
+            finished = np.where(is_finished, values, np.nan)
+            at_points = [Statistics.of(finished[self.rows(point)]) for point in self.points]
+            statistics[name] = Statistics(*(np.array([getattr(each, part) for each in at_points]) for part in PARTS))
         return statistics
 
     @property

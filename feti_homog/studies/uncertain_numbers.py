@@ -97,7 +97,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
-        is_triple = isinstance(pair, list) and len(pair) == len(("KEY", "KEY", "VALUE"))
+        is_triple = isinstance(pair, list) and len(pair) == 3
         names = frozenset(map(str, pair[:2])) if is_triple else frozenset[str]()
         place = f"[{sections.UNCERTAINTY}] {sections.CORRELATION} = {wording.toml_value(pair)}"
         if len(names & named.keys()) != 2 or not types.is_number(pair[2]) or abs(pair[2]) > 1:
@@ -132,7 +132,8 @@ def _means(
     else:
         # Two symmetric entries of a stiffness are one number, with the name Cij, as in derivatives.
         entry = ((*path[:-2], "C" + "".join(sorted(path[-2:]))) if is_entry else path, deviation)
-        given += [] if is_entry and entry in given else [entry]
+        if not (is_entry and entry in given):
+            given.append(entry)
     return value["mean"]
 
 

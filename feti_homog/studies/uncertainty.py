@@ -184,8 +184,9 @@ def _data(documents: Documents) -> list[Datum]:
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
         peak = landmarks.peak_of(documents[0])
-        pairs = zip(named, map(landmarks.peak_of, documents), strict=True)
-        if len({("onset_load_factor" in values, "stress_left" in of) for values, of in pairs}) > 1:
+        breaks = {"onset_load_factor" in values for values in named}
+        falls = {"stress_left" in landmarks.peak_of(document) for document in documents}
+        if len(breaks) > 1 or len(falls) > 1:
             raise CaseError("[path]: bonds break, or the stress falls, in some runs and not in others; load it further")
         ends = "load_factor", "temperature", peak["stress_name"], peak["strain_name"]
         names = [n for n in names if n.partition("_")[2] in ends and any(values[n] for values in named)]

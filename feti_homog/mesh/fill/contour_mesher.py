@@ -57,8 +57,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         # Points about two pixels apart, both ends included.
         length = np.append(0.0, np.cumsum(np.hypot(*np.diff(contour, axis=0).T)))
         places = np.linspace(0.0, length[-1], max(8, round(length[-1] / 2.0)) + 1)
-        curves.append(np.column_stack([np.interp(places, length, x) for x in contour.T]))
-        curves[-1][[0, -1]] = contour[[0, -1]]
+        curve = np.column_stack([np.interp(places, length, x) for x in contour.T])
+        curve[[0, -1]] = contour[[0, -1]]
+        curves.append(curve)
     size = np.array([1.0, rows / width])
     field = _size_field(curves, indicator, cell.mesh_size, size)
     refuse_many(field, field.least, size)
@@ -74,11 +75,12 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         advice = "larger regions of a phase: filter the image, or smooth = false"
         content = filled(gmsh, size, field, "smooth = true", advice)
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
-    place = i + 0.5 - width * (2 * i > width), j + 0.5 - rows * (2 * j > rows)
+    # Of the images of the corner, the nearest to the corner of the user's image.
+    column, row = i - width if 2 * i > width else i, j - rows if 2 * j > rows else j
     counts = zip(phases, np.bincount(phase.ravel()).tolist(), strict=True)
     shares = ", ".join(f"{name} {count / phase.size:.6g}" for name, count in counts)
     remark = f"[cell] smooth = true: fractions in the image: {shares}"
-    return replace(mesh, origin=(cell.pixel * place[0], cell.pixel * place[1]), remarks=(remark,))
+    return replace(mesh, origin=(cell.pixel * (column + 0.5), cell.pixel * (row + 0.5)), remarks=(remark,))
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
@@ -112,8 +114,8 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
     slopes = [np.roll(indicator, -1, k) - np.roll(indicator, 1, k) for k in (0, 1)]
     normal = np.column_stack([map_coordinates(slope, points.T, order=1, mode="grid-wrap") for slope in slopes])
     normal /= np.maximum(np.hypot(*normal.T), np.finfo(float).tiny)[:, None]
-    count = [*range(1, min(NEAREST, len(points)) + 1)]
-    distance, nearest = cKDTree(points % period, boxsize=period).query(points % period, k=count)
+    ranks = list(range(1, min(NEAREST, len(points)) + 1))
+    distance, nearest = cKDTree(points % period, boxsize=period).query(points % period, k=ranks)
     faces = np.einsum("ijk,ik->ij", normal[nearest], normal) < -0.5
     length = np.minimum(length, PASSAGE_EDGE * np.where(faces, distance, np.inf).min(axis=1))
     length = np.minimum(largest, unit * np.maximum(length, 1.0))
@@ -131,7 +133,7 @@ def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> 
     corners, middles = points[place[:, :3], :2], place[:, 3:]
     onward = np.roll(corners, -1, axis=1)
     straight = (corners + onward) / 2
-    rise, length = (np.linalg.norm(v, axis=2) for v in (points[middles, :2] - straight, onward - corners))
+    rise, length = np.linalg.norm(points[middles, :2] - straight, axis=2), np.linalg.norm(onward - corners, axis=2)
     points[middles[rise > 0.2 * length], :2] = straight[rise > 0.2 * length]
     column, row = np.round(corners.mean(axis=1) * phase.shape[1]).astype(np.int64).T
     surfaces, which = np.unique(entity, return_inverse=True)

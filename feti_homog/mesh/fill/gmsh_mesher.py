@@ -49,9 +49,10 @@ def begin(
     around = min(sizes.interface, estimate.interface_size)
     at_tips = sum(map(len, marks.values())) * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
     if (count := estimate.triangles + at_tips) > limit:
-        keys = ("mesh_size", "interface_size", *(["tip_size"] if at_tips else []))
+        keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
         values = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
-        values += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
+        if cell.fibres is not None:
+            values.append(f"fibres = {cell.fibres}")
         elements = f"{count:.2g} elements before refine; expected at most {limit}; refine splits them on the ranks"
         raise MeshError(f"[cell] {', '.join(values)}: about {elements}")
     arrangement = arrange(cell) if listed is None else listed

@@ -28,10 +28,10 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
         return contour_mesher.mesh_contours(phase, phases, cell)
     is_solid = phase != (*phases, phase_names.VOID).index(phase_names.VOID)
-    solid, (rows, columns), n = np.flatnonzero(is_solid), phase.shape, phase.shape[1] + 1
+    solid, (rows, columns), n = np.flatnonzero(is_solid), phase.shape, phase.shape[1] + 1  # n: nodes in a row
     corners = (solid + solid // columns)[:, None] + [0, 1, n + 1, n]
     nodes, elements = present(corners, n * (rows + 1))
-    places, number = np.stack([nodes % n, nodes // n], axis=1), phase.ravel()[solid]
+    places, number = np.stack([nodes % n, nodes // n], axis=1), phase[is_solid]
     representative = np.arange(len(nodes), dtype=np.int32)
     if cell.boundary == "periodic":
         node_class, first = places % [columns, rows] @ [1, n], np.empty(n * rows, np.int32)
@@ -48,7 +48,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
         representative=representative,
         boundary=cell.boundary,
     )
-    if faults := [] if len(solid) == phase.size else _void_faults(mesh, is_solid):
+    if faults := [] if is_solid.all() else _void_faults(mesh, is_solid):
         raise MeshError(*(f"{cell.file.name}: {fault}" for fault in faults))
     return mesh
 
@@ -56,7 +56,8 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
     """List faults: pixels that voids cut off, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
-    faults, sizes = [], np.bincount(part := components(len(solid), *Torus.of(mesh).sides[:2]))
+    part = components(len(solid), *Torus.of(mesh).sides[:2])
+    faults, sizes = [], np.bincount(part)
     for k in np.flatnonzero(part != sizes.argmax())[:1]:
         where = f"{sizes[part[k]]} pixels around row {rows - solid[k] // columns}, column {solid[k] % columns + 1}"
         line = "floating parts, separated from all others by voids: the part of"

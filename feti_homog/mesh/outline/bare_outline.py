@@ -86,7 +86,8 @@ class BareOutline:
 
             field = elliptic_outline.size_field(arrangement, sizes, outer, tips, curves[crossing[0]], crossing[1])
             arcs = elliptic_outline.EllipticArcs.of(curves[circle], start, stop, sizes.interface)
-            straight = Segments(*np.zeros((3, 0, 2)))
+            none = np.zeros((0, 2))
+            straight = Segments(none, none, none)
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
@@ -117,7 +118,8 @@ class BareOutline:
         longest = np.full((len(span), 2), self.field.largest)
         pieces = Segments(outline.on_side(begin, axis, 0.0), outline.on_side(span, axis, 0.0), longest)
         sampling = self.lines.sampling
-        for level, low in ((0.0, True), (self.size[1 - axis], False)):
+        # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+        for level, is_forward in ((0.0, axis == 0), (self.size[1 - axis], axis == 1)):
             inside = outline.curve_at(self.curves, outline.on_side(begin + span / 2, axis, level))
             # A chord has at least two edges, because a triangle with a chord and two arc edges cannot flip. A piece
             # between both circles of a coating is not a chord.
@@ -130,8 +132,7 @@ class BareOutline:
             piece, first = stations.line, stations.first
             along, node = begin[piece] + span[piece] * stations.share, np.arange(len(piece))
             along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
-            if low != (axis == 0):
-                # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+            if not is_forward:
                 node = (first[:-1] + first[1:] - 1)[piece] - node
             straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
             yield outline.on_side(along, axis, level), Curves(node, first, straight, inside, beyond)

@@ -164,15 +164,15 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     is_outer = np.diff(disc, prepend=-1) > 0
     outer, longest = circles[is_outer], caps[is_outer]
     first, second, vector = arrangements.neighbours(outer[:, :2], size, 2 * outer[:, 2].max() + largest)
-    distance, (one, other) = np.linalg.norm(vector, axis=1), (outer[first], outer[second])
+    distance, one, other = np.linalg.norm(vector, axis=1), outer[first], outer[second]
     gap, normal = distance - one[:, 2] - other[:, 2], vector / distance[:, None]
     faces = one[:, :2] + one[:, 2:] * normal, other[:, :2] - other[:, 2:] * normal
     sources = passages(gap, 1 / one[:, 2] + 1 / other[:, 2], faces, (longest[first], longest[second]))
     # Between circles and sides, and at crossings.
     centres, radii = circles[:, :2] % size, circles[:, 2]
     for axis in AXES:
-        distance = np.where(axis > 0, size - centres, centres)[:, axis != 0][:, 0]
-        extreme, foot = (centres + along[:, None] * axis for along in (radii, distance))
+        distance = np.where(axis > 0, size - centres, centres) @ np.abs(axis)
+        extreme, foot = centres + radii[:, None] * axis, centres + distance[:, None] * axis
         sources += passages(np.abs(distance - radii), 1 / radii, (extreme, foot), (caps, largest))
         angle = np.arccos(np.minimum(distance / radii, 1.0))
         length = angle * radii / WEDGE

@@ -215,8 +215,8 @@ def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges:
             break
         index = np.flatnonzero(wide) + 1
         middle, owner = (samples[index - 1] + samples[index]) / 2, line[index]
-        inserted = (line, index, owner), (samples, index, middle), (sizes, index, size_at(owner, middle))
-        line, samples, sizes = (np.insert(*values) for values in inserted)
+        sizes = np.insert(sizes, index, size_at(owner, middle))
+        line, samples = np.insert(line, index, owner), np.insert(samples, index, middle)
     density, begin = lengths[line] / sizes, np.searchsorted(line, np.arange(len(lengths) + 1))
     # int ds / h from the beginning of each line, by the trapezoidal rule.
     measure, counts, last = np.zeros(len(samples)), np.diff(begin), begin[1:] - 1
@@ -258,8 +258,8 @@ class SizedLines:
 
     def parts(self, count: int) -> list[SizedLines]:
         """Divide the lines, in order, into `count` parts of nearly equal size."""
-        bounds = (distributed_arrays.even(len(lines), count) for lines in (self.arcs, self.bridges))
-        ends = zip(*map(pairwise, bounds), strict=True)
+        arcs, bridges = (distributed_arrays.even(len(lines), count) for lines in (self.arcs, self.bridges))
+        ends = zip(pairwise(arcs), pairwise(bridges), strict=True)
         return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:

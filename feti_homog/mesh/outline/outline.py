@@ -152,7 +152,8 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
     parts = np.maximum(1, np.ceil(span / (TURN / 4) - SAME_PLACE)).astype(int)
     begin = np.repeat(np.arange(len(parts)), parts)
     part = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
-    arc_curve, first, last = curve[begin], *(angle[begin] + (span[begin] * k / parts[begin]) for k in (part, part + 1))
+    arc_curve, first = curve[begin], angle[begin] + span[begin] * part / parts[begin]
+    last = angle[begin] + span[begin] * (part + 1) / parts[begin]
     middle = curves[arc_curve].points((first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
     return arc_curve[within], first[within], last[within]
@@ -162,7 +163,7 @@ def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Flo
     """Find the vertices (t, 2) at the marks on the curves of an arrangement."""
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
-    name, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])
+    name, mark = np.array([name for name, _ in pairs], np.int64), np.array([mark for _, mark in pairs])
     fibre = np.where(name < 0, ~name, name)
     curves = arrangement.outlines[fibre].grown(np.where(name < 0, 0.0, arrangement.coating[fibre]))
     size = arrangement.size

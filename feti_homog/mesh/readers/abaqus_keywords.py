@@ -20,9 +20,9 @@ READ: dict[str, tuple[str, ...] | None] = {
 OF_SECTIONS = ("ELSET", "MATERIAL")
 # Keywords that make or move nodes and elements, and the reason for the refusal.
 GENERATORS = (
-    *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
-    *("SYMMETRIC MODEL GENERATION", "SUBSTRUCTURE GENERATE", "USER ELEMENT", "REFINE MESH", "MODEL CHANGE"),
-)
+    "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER",
+    "SYMMETRIC MODEL GENERATION", "SUBSTRUCTURE GENERATE", "USER ELEMENT", "REFINE MESH", "MODEL CHANGE",
+)  # fmt: skip
 REFUSED = dict.fromkeys(GENERATORS, "it makes or moves nodes or elements, and is not read: write them out")
 REFUSED["INCLUDE"] = "other files are not read: expected all in one file"
 WHOLE = {name.replace(" ", ""): name for name in (*READ, *REFUSED)}

@@ -102,9 +102,10 @@ def load(path: Path) -> RawMesh:
         head = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})" if has_blocks else rb"\s*(\d{1,15})(?=\s)", text + b"\n")
         if head is None:
             raise MeshError("$Elements: expected the number of elements at its beginning")
-        *_, count = counts = [*map(int, head.groups())]
-        expected = 1 + sum(counts)
-        if not is_binary and (lines := sum(not line.isspace() for line in io.BytesIO(text))) != expected:
+        counts = [int(number) for number in head.groups()]
+        count, expected = counts[-1], 1 + sum(counts)
+        lines = expected if is_binary else sum(not line.isspace() for line in io.BytesIO(text))
+        if lines != expected:
             # gmsh would skip lines.
             raise MeshError(f"$Elements: {lines} lines, and its counts announce {expected}, one for each element")
     with TemporaryDirectory() as folder:
@@ -118,9 +119,9 @@ def load(path: Path) -> RawMesh:
     read = sum(len(numbers) for numbers, *_ in content.elements.values())
     if read != count:
         raise MeshError(f"$Elements: {count} elements are announced, and {read} are there, each with its own number")
-    text = sections.get("PhysicalNames", b"\n0")
-    entries = NAME.findall(text)
-    if text.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
+    physical_names = sections.get("PhysicalNames", b"\n0")
+    entries = NAME.findall(physical_names)
+    if physical_names.split(maxsplit=1)[:1] != [str(len(entries)).encode()]:
         raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
     names = {(int(d), int(number)): name.decode(errors="replace").strip() for d, number, name in entries}
     if len(names) < len(entries):
@@ -205,11 +206,10 @@ def raw_mesh(content: MshContent) -> RawMesh:
     for kind in [] if faults else [kind for kind in elements if kind in kinds - {*TRIANGLES}]:
         numbers, nodes, _ = elements[kind]
         centre = content.points[np.isin(content.tags, nodes[0])].mean(axis=0)
-        faults.append(
-            f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {kind}: only "
-            "triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be "
-            "used (mesh the surfaces only, with Mesh.ElementOrder = 1 or 2)"
-        )
+        first = f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {kind}"
+        usable = "only triangles of three or six nodes, quadrilaterals of four, eight or nine and lines of two or three"
+        advice = "mesh the surfaces only, with Mesh.ElementOrder = 1 or 2"
+        faults.append(f"{first}: {usable} can be used ({advice})")
     if faults:
         raise MeshError(*faults)
     lines = [elements[kind] for kind in LINES if kind in elements]

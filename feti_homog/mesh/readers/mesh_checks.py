@@ -150,8 +150,8 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     nodes = np.unique(inner)
     tree, middle, along = cKDTree(plane[nodes]), plane[inner].mean(axis=1), plane[inner[:, 1]] - plane[inner[:, 0]]
     reach = np.linalg.norm(along, axis=1) / 2
-    some = slice(None, None, 1 + len(inner) // 1000)
-    if some.step * tree.query_ball_point(middle[some], reach[some], return_length=True).sum() > MOST_CANDIDATES:
+    step = 1 + len(inner) // 1000  # between the edges of a sample
+    if step * tree.query_ball_point(middle[::step], reach[::step], return_length=True).sum() > MOST_CANDIDATES:
         return [f"{len(inner)} edges within the cell have one triangle only, and long ones cross: no mesh of a cell"]
     hanging = []
     for candidates, pair, vector in zip(tree.query_ball_point(middle, reach), inner, along, strict=True):

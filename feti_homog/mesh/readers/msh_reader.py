@@ -147,13 +147,13 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     reach = tolerance * float(np.ptp(plane[:, 0]))
     sides = {}
     for axis in (0, 1):
-        for extreme in (np.min, np.max):
+        for end, extreme in (("low", np.min), ("high", np.max)):
             along = plane[outer, axis]
             side = outer[np.abs(along - extreme(along)) <= reach]
             plane[side, axis] = np.median(plane[side, axis])
-            sides[axis, extreme is np.max] = side
+            sides[axis, end] = side
     for axis in (0, 1):
-        low, high, along = sides[axis, False], sides[axis, True], plane[:, 1 - axis]
+        low, high, along = sides[axis, "low"], sides[axis, "high"], plane[:, 1 - axis]
         distance, to_high = cKDTree(along[high, None]).query(along[low, None])
         to_low = cKDTree(along[low, None]).query(along[high, None])[1]
         mutual = (to_low[to_high] == np.arange(len(low))) & (distance <= reach)
@@ -255,18 +255,18 @@ def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Co
     mixed = any("fib" not in name.casefold() for name in shares)  # numbers of an array are called fibre, fibre:2, ...
     order = sorted(shares, key=lambda k: (mixed and k in materials, mixed and "fib" in k.casefold(), -shares[k]))
     others = sorted({*order} - {"matrix", *phases}, key=lambda k: (k.casefold() != "matrix", order.index(k)))
-    first = others[: not has_matrix]
-    if renamed := first + [name for name in others[len(first) :] if name not in usual]:  # usual names stay
-        entries = {name: wording.toml_value([*some] if some[1:] else some[0]) for name, some in phases.items()}
+    to_matrix = [] if has_matrix else others[:1]
+    if renamed := to_matrix + [name for name in others if name not in (*to_matrix, *usual)]:  # usual names stay
+        entries = {name: wording.toml_value(list(some) if len(some) > 1 else some[0]) for name, some in phases.items()}
         alike = {k: k.casefold() for k in renamed if k.casefold() in {*usual} - {*names, *entries}}
         entries |= {name: _as_selected(k) for k, name in alike.items()}
         targets = [name for name in dict.fromkeys(usual) if name not in (*names, *entries)]
         entries |= dict(zip(targets, (_as_selected(k) for k in renamed if k not in alike), strict=False))
         written = ", ".join(f"{wording.toml_key(a)} = {b}" for a, b in entries.items())
-        condition = f"If {_as_selected(first[0])} is the matrix" if first else "If these are fibres"
-        condition += ", set in" if phases else ", add to"
+        condition = f"If {_as_selected(to_matrix[0])} is the matrix" if to_matrix else "If these are fibres"
+        verb = "set in" if phases else "add to"
         listed = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
-        faults[-1] += f". {condition} [cell]: phases = {{{written}}}. Shares of the area: {listed}"
+        faults[-1] += f". {condition}, {verb} [cell]: phases = {{{written}}}. Shares of the area: {listed}"
     return faults
 
 

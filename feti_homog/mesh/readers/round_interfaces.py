@@ -57,7 +57,6 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
     # Copies move like their representatives, but stay on the right or upper side.
     mesh = replace(mesh, points=np.where(mesh.points == mesh.period, mesh.period, points[mesh.representative]))
     mesh = _with_arcs(mesh, circles, arcs)
-    # Flip edges of triangles with two edges on one circle; if this fails, the circle stays a polygon.
     nodes = len(mesh.points)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, mesh.arc_edges, mesh.arc_circle, nodes)
     bad, _ = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)

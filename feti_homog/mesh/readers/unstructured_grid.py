@@ -29,9 +29,9 @@ NAMES |= {13: "wedges", 14: "pyramids", 34: "triangles of seven nodes", 42: "pol
 PHASE = "phase"
 # Cell data with material numbers of other programs, in the order of precedence.
 NUMBERS = (
-    *("medit:ref", "gmsh:physical", "CellEntityIds", "mat_id", "MaterialIds"),
-    *("material", "cell_tags", "region", "gmsh:geometrical"),
-)
+    "medit:ref", "gmsh:physical", "CellEntityIds", "mat_id", "MaterialIds",
+    "material", "cell_tags", "region", "gmsh:geometrical",
+)  # fmt: skip
 MOST_PHASES = 10**9
 
 
@@ -107,14 +107,14 @@ def mesh_of(grid: Grid) -> RawMesh:
     if faults:
         raise MeshError(*faults)
     has_phases, groups, blocks = name == PHASE, values.astype(np.int64), []
-    values = np.unique(groups[np.isin(types, [*TRIANGLES])])
+    distinct = np.unique(groups[np.isin(types, [*TRIANGLES])])
     for kind, count in TRIANGLES.items():
         cells = np.flatnonzero(types == kind)
         if len(cells):
-            group = np.searchsorted(values, groups[cells])
+            group = np.searchsorted(distinct, groups[cells])
             blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), group))
-    aliases = [(f"number {k}",) for k in values.tolist()]
-    phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in values.tolist()]
+    aliases = [(f"number {k}",) for k in distinct.tolist()]
+    phases = [({0: "matrix", 1: "fibre"}.get(k, f"fibre:{k}"),) for k in distinct.tolist()]
     names, containers = (phases if has_phases else aliases), (f"value of {name}", "cells")
     lines = np.flatnonzero(np.isin(types, [*LINES]))
     marks = np.ravel(data.get(DEBONDED, np.zeros(len(types))))[lines]

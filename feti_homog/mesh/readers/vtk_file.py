@@ -63,7 +63,7 @@ def load(path: Path) -> RawMesh:
     points, none, sections = np.zeros((0, 3)), np.zeros(0, np.int64), set[str]()
     types, nodes, counts, cell_data, arrays, length = none, none, none, dict[str, Numbers](), dict[str, Numbers](), 0
     while words := file.line():
-        section, words = words[0].upper(), [*words[1:], *[""] * 4]
+        section, words = words[0].upper(), [*words[1:], "", "", "", ""]
         if section in sections & {"DATASET", "POINTS", "CELLS", "CELL_TYPES"}:
             file.refuse(f"{section}: it is there twice")
         sections.add(section)
@@ -200,7 +200,7 @@ class Scanner:
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
-        kind = kind if self.is_binary else "f8" if kind[0] == "f" else "i8"
+        kind_of_text = "f8" if kind[0] == "f" else "i8"
         size = int(kind[1]) if self.is_binary else 1
         if count * size > len(self.content) - self.place:
             self.refuse(f"{count} values should follow, and {len(self.content) - self.place} bytes do")
@@ -211,7 +211,7 @@ class Scanner:
         last = deque(islice(WORD.finditer(self.content, start), count), maxlen=1)
         self.place = last[0].end() if last else start
         try:
-            values = numbers(self.content[start : self.place], kind)
+            values = numbers(self.content[start : self.place], kind_of_text)
         except NotANumber as error:
             self.place = start + error.place
             self.refuse(str(error))

@@ -161,13 +161,15 @@ class _Arrays:
             raise ValueError
         for length in lengths:
             block, start = data[start : start + length], start + length
+            is_complete = len(block) == length
             if self.decompressor:
                 decompressor = self.decompressor()
                 block = decompressor.decompress(block, self.budget + 1)
                 self.budget -= len(block)
                 if self.budget < 0:
                     raise MeshError("its compressed data are too large for a file of its length")
-            if len(block) < length if self.decompressor is None else not decompressor.eof:
+                is_complete = decompressor.eof
+            if not is_complete:
                 raise ValueError
             unpacked.append(block)
         return b"".join(unpacked)

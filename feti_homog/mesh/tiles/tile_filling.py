@@ -166,7 +166,8 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int], f
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
         loops = regions[region]
         outer_and_holes = {k: [line_tags] for k, (area, _, line_tags) in enumerate(loops) if area >= 0}
-        for polygon, line_tags in (loop[1:] for loop in loops if loop[0] < 0):
+        holes = [(polygon, line_tags) for area, polygon, line_tags in loops if area < 0]
+        for polygon, line_tags in holes:
             # A polygon turns once around an inner point. Of nested polygons, the smallest surrounds the hole.
             offsets = [loops[k][1] - polygon[0] for k in outer_and_holes]
             turns = [np.angle(np.roll(vectors, -1) / vectors).sum() for vectors in offsets]

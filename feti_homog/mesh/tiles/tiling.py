@@ -91,16 +91,16 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
     # Side pieces in the matrix: the discs or corners at both ends, and the end points.
     nodes, ends = [], []
     for axis, is_far in np.ndindex(2, 2):
-        level, places = is_far * size[1 - axis], crossings(discs[outer], axis, size)
-        points, middles = (on_side(along, axis, level) for along in (places, (places[:-1] + places[1:]) / 2))
-        circle = curve_at(discs[outer], middles)
-        corner = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
-        around = np.concatenate([corner[:1], outer[circle], corner[1:]])
+        level, places = size[1 - axis] if is_far else 0.0, crossings(discs[outer], axis, size)
+        points = on_side(places, axis, level)
+        circle = curve_at(discs[outer], on_side((places[:-1] + places[1:]) / 2, axis, level))
+        first, last = len(discs) + (points[[0, -1]] > 0) @ [1, 2]
+        along_side = np.concatenate([[first], outer[circle], [last]])
         piece = np.flatnonzero(circle == MATRIX)
         # Counter-clockwise around the cell.
-        way = slice(None, None, 1 if is_far == axis else -1)
-        nodes.append(around[piece[:, None] + [0, 2]][:, way])
-        ends.append(points[piece[:, None] + [0, 1]][:, way])
+        order = [0, 1] if is_far == axis else [1, 0]
+        nodes.append(along_side[piece[:, None] + [0, 2]][:, order])
+        ends.append(points[piece[:, None] + [0, 1]][:, order])
     sides = np.concatenate(nodes), np.concatenate(ends)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_faces.matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
@@ -200,7 +200,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
     Also returns the class (n,) of each node, numbered in the cell, and the tile (m,) of each triangle.
     """
-    scalars, pairs, triples = (np.zeros((0, *shape), np.int64) for shape in ((), (2,), (3,)))
+    scalars, pairs, triples = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3), np.int64)
     parts: list[tuple[Array, ...]] = [(scalars, scalars, 0.0 * pairs, triples, scalars, scalars, pairs, scalars)]
     for filled in tiles:
         tile, filling, curves = filled.tile, filled.filling, filled.tile.curves
