@@ -10,8 +10,8 @@ from support.cases import FIBRE, MATRIX
 from feti_homog import Case, run
 from feti_homog.analysis.constants import mesh_error
 from feti_homog.analysis.recorders import CheckRecorder
-from feti_homog.report.text.constant_tables import bounds
 from feti_homog.homogenization.mesh_estimate import EnergyErrors
+from feti_homog.report.text.constant_tables import bounds
 
 pytestmark = pytest.mark.parallel
 
