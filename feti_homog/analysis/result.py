@@ -89,8 +89,8 @@ class Result:
     kkt_tolerance: float = described("largest error of a contact check that passes")
     warnings: tuple[str, ...] = described("settings that are valid but probably unintended")
     remarks: tuple[str, ...] = described("assumptions about settings that the case does not give", default=())
-    faults: tuple[str, ...] = described("solves that did not converge and checks that failed")
-    status: str = described("`done`, or `not converged` if there are faults")
+    faults: tuple[str, ...] = described("solves that did not converge, checks that failed, fields that are missing")
+    status: str = described("`done`, `not converged`, or `incomplete` if fields could not be written")
     moduli: engineering_constants.Moduli | None = described("engineering moduli of a bonded cell", default=None)
     bounds: cell_records.StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(

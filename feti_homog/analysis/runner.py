@@ -129,8 +129,9 @@ def _run_and_write(
         if states.error is not None and not keep_fields:
             analysis.pop("states", None)
     result = replace(_result(context, analysis, states.fields()), result_h5=seal)
-    if states.error is not None:  # the numbers are sound, and so the status is "done"
-        result = replace(result, faults=(*result.faults, str(states.error)))
+    if states.error is not None:  # the numbers are sound
+        status = "incomplete" if result.status == "done" else result.status
+        result = replace(result, faults=(*result.faults, str(states.error)), status=status)
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error

@@ -4,6 +4,7 @@ The writer waits until both the content and the name of a file are on the disk.
 """
 
 import contextlib
+import errno
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -91,11 +92,17 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """Context manager: turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH: REASON"."""
+    """Context manager: turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH: REASON".
+
+    Where HDF5 gives no reason, the reason is a lack of space if the disk is full.
+    """
     try:
         yield
     except (OSError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        reason: object = error.strerror if isinstance(error, OSError) and error.strerror else error
+        with contextlib.suppress(OSError):
+            if reason is error and verb == "write" and os.statvfs(path.parent).f_bavail == 0:
+                reason = os.strerror(errno.ENOSPC)
         raise FetiHomogError(f"cannot {verb} {path}: {reason}") from error
 
 

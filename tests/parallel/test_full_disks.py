@@ -120,7 +120,7 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     parallel_assert(comm, count == 2 if name == "events" else count > 2)
     if name == "result.h5":
         document = json.loads((out / "result.json").read_text())
-        assert document["status"] == "done" and "result.h5: No space left on device" in document["faults"][0]
+        assert document["status"] == "incomplete" and "result.h5: No space left on device" in document["faults"][0]
         parallel_assert(comm, cli.main(["report", str(out)]) == 2)
         words = "result.h5: it is missing; run the case again with [output] fields = true and --resume: "
         told_once(comm, capsys, words)
@@ -165,7 +165,7 @@ def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
     told_once(comm, capsys, "error: cannot write ", "result.h5: File too large")
     if comm.rank == 0:
         document = json.loads((out / "result.json").read_text())
-        assert document["status"] == "done" and "result.h5: File too large" in document["faults"][0]
+        assert document["status"] == "incomplete" and "result.h5: File too large" in document["faults"][0]
         assert document["path"][-1]["load_factor"] == 1.0
         assert (
             "result_h5" not in document

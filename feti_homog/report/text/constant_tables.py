@@ -138,7 +138,7 @@ def bounds(document: Document) -> Table:
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
     for i, name in enumerate(STIFF):
         lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]
-        inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
+        inside = max(lower - value, value - upper) <= document.get("check_tolerance", 0.0) * abs(value)
         rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
     # These bounds hold for isotropic cells only, so a value outside is no fault.
     for name, (lower, upper) in (limits["hashin_shtrikman"] or {}).items():

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from feti_homog import Case, run
 from feti_homog.analysis import conductivity
+from feti_homog.analysis.recorders import CheckRecorder
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.phase_bounds import ConductivityEstimates
 
@@ -26,7 +27,7 @@ TURN = np.array([[0.6, -0.8], [0.8, 0.6]])
     ],
 )
 def test_principal_conductivities_outside_their_bounds_are_faults(across, outside):
-    checks, notes = SimpleNamespace(faults=[]), []
+    checks, notes = CheckRecorder(1e-8), []
     case = SimpleNamespace(cell=SimpleNamespace(boundary="periodic"))
     k = np.diag([0.0, 0.0, 9.0])
     k[:2, :2] = TURN @ np.diag(across) @ TURN.T

@@ -1,7 +1,13 @@
-"""Files that killed writers left are removed, no others."""
+"""Files that killed writers left are removed, no others; errors of writes name a reason."""
 
+import errno
+import os
+from types import SimpleNamespace
+
+import pytest
 from mpi4py import MPI
 
+from feti_homog.errors import FetiHomogError
 from feti_homog.results import atomic, output_folder
 from feti_homog.system.runtime import file_locks
 
@@ -32,3 +38,20 @@ def test_a_committed_file_has_its_name_only(tmp_path):
     part.write_text("a,b\n")
     atomic.commit(part, tmp_path / "table.csv")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["a,b\n"]
+
+
+@pytest.mark.parametrize(
+    ("error", "blocks", "reason"),
+    [
+        (OSError("Can't write data (file write failed)"), 0, os.strerror(errno.ENOSPC)),
+        (OSError("Can't write data (file write failed)"), 9, "Can't write data (file write failed)"),
+        (OSError(errno.EFBIG, os.strerror(errno.EFBIG)), 0, os.strerror(errno.EFBIG)),
+    ],
+    ids=["full", "not full", "another reason"],
+)
+def test_a_full_disk_is_the_reason_where_hdf5_gives_none(tmp_path, monkeypatch, error, blocks, reason):
+    """Through MPI-IO, HDF5 loses the reason of a write error."""
+    monkeypatch.setattr(os, "statvfs", lambda folder: SimpleNamespace(f_bavail=blocks))
+    with pytest.raises(FetiHomogError) as caught, atomic.file_errors("write", tmp_path / "result.h5"):
+        raise error
+    assert caught.value.faults == (f"cannot write {tmp_path / 'result.h5'}: {reason}",)
