@@ -88,7 +88,7 @@ def _read_material(
     table: object, section: str, plane: str | None, reader: TableReader
 ) -> material_forms.Material | None:
     """Read a material in the form that its keys select; None for faulty keys.  Faults go to the reader."""
-    names, given = list(table) if isinstance(table, dict) else list[str](), dict[str, list[str]]()
+    names, given = (list(table) if isinstance(table, dict) else list[str]()), dict[str, list[str]]()
     sheet = {name: key for name in names if (key := DATA_SHEET.get(name.lower().replace("_", "")))}
     if isinstance(table, dict) and not sheet.keys() <= FORMS_OF.keys():
         axes = f"{', '.join(sheet)}: axis 1 of a data sheet is along the fibres, which are along x3 here"

@@ -32,7 +32,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
         placed = path.placed
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
             loads = load_sections.completed(tuple(placed.values()), plane)
-            repeats = not any(loads[0].values()), *(before == after for before, after in pairwise(loads))
+            repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
             formers = ["zero, where the path begins", *list(placed)[:-1]]
             for (place, entry), former, is_repeat in zip(placed.items(), formers, repeats, strict=True):
                 value = entry.named if isinstance(entry, load_sections.MixedLoad) else entry

@@ -56,7 +56,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
     free = expansion(material)
     angle = 0.0
     if isinstance(material, material_forms.Orthotropic):
-        angle, turn = material.angle, TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK]
+        angle, turn = material.angle, (TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK])
         yield LawChange("angle", angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
     if len(C) == 6 and free is not None:
         to_cell = strain_rotation(-angle)[:, :3]

@@ -98,7 +98,7 @@ def _limit(axes: Axes) -> None:
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
     """Return bounds by output name: by Reuss and Voigt for C11 and C33, else by Hashin and Shtrikman, or Hill."""
     bounds = document.get("bounds") or {}
-    forms, ends = document.get("conductivity_estimates") or {}, [bounds["reuss"], bounds["voigt"]] if bounds else []
+    forms, ends = document.get("conductivity_estimates") or {}, ([bounds["reuss"], bounds["voigt"]] if bounds else [])
     pairs: dict[str, Any] = {f"C{k + 1}{k + 1}": tuple(end[k][k] for end in ends) for k in (0, 2) if ends}
     pairs |= dict.fromkeys(("k11", "k22"), forms.get("hashin_shtrikman"))
     pairs |= (bounds.get("hashin_shtrikman") or {}) | (document.get("fibre_bounds") or {})
@@ -151,7 +151,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     """
     single = [row for row in document["measured"] if row["strain"] is None]
     points = [row for row in document["measured"] if row["strain"] is not None]
-    count, unit = 2 if single and points else 1, plot_helpers.stress_unit(results[0]["case"]) if results else ""
+    count, unit = (2 if single and points else 1), (plot_helpers.stress_unit(results[0]["case"]) if results else "")
     figure = Figure(figsize=(6.5 * count, 4.5), layout="constrained")
     panels = figure.subplots(1, count, squeeze=False)[0]
     if single:
@@ -172,16 +172,14 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     if points:
         numbers = dict.fromkeys(row["test"] for row in points)
         for test, colour, marker in zip(numbers, cycle(plot_helpers.INK), cycle(MARKERS), strict=False):
-            x, y, std, computed = (
-                np.array([row[name] for row in points if row["test"] == test])
-                for name in ("strain", "value", "std", "computed")
-            )
+            rows = [row for row in points if row["test"] == test]
+            names = ("strain", "value", "std", "computed")
+            x, y, std, computed = (np.array([row[name] for row in rows]) for name in names)
             panels[-1].errorbar(x, y, std, fmt=marker, color=colour, markersize=4, label=f"test {test}, measured")
             curve = path_curves.rising_strain(results[test - 1]) if results else None
             if curve is not None:
                 stresses = voigt.voigt_names(curve.shape[1] - 1)[1]
-                name = next(row["name"] for row in points if row["test"] == test)
-                x, computed = np.sign(x[-1]) * curve[:, -1], curve[:, stresses.index(name)]
+                x, computed = np.sign(x[-1]) * curve[:, -1], curve[:, stresses.index(rows[0]["name"])]
             panels[-1].plot(x, computed, color=colour, linewidth=1.2, label=f"test {test}, computed")
         symbols = [f"${plot_helpers.SYMBOLS[points[0][name]]}$" for name in ("strain_name", "name")]
         panels[-1].set(xlabel=f"macroscopic strain {symbols[0]}", ylabel=f"stress {symbols[1]} {unit}".rstrip())

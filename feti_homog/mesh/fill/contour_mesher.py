@@ -76,7 +76,7 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
         content = filled(gmsh, size, field, "smooth = true", advice)
     mesh = made(raw_mesh(_with_phases(content, phase, phases)), "smooth outlines").scaled(width * cell.pixel)
     # Of the images of the corner, the nearest to the corner of the user's image.
-    column, row = i - width if 2 * i > width else i, j - rows if 2 * j > rows else j
+    column, row = (i - width if 2 * i > width else i), (j - rows if 2 * j > rows else j)
     counts = zip(phases, np.bincount(phase.ravel()).tolist(), strict=True)
     shares = ", ".join(f"{name} {count / phase.size:.6g}" for name, count in counts)
     remark = f"[cell] smooth = true: fractions in the image: {shares}"

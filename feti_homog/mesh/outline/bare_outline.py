@@ -86,8 +86,7 @@ class BareOutline:
 
             field = elliptic_outline.size_field(arrangement, sizes, outer, tips, curves[crossing[0]], crossing[1])
             arcs = elliptic_outline.EllipticArcs.of(curves[circle], start, stop, sizes.interface)
-            none = np.zeros((0, 2))
-            straight = Segments(none, none, none)
+            straight = Segments(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2)))
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:

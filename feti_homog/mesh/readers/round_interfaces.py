@@ -86,8 +86,11 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     ellipses, arcs, polygons = list[Ellipses](), list[Int32](), list[str]()
     for _, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_ELLIPSE_EDGES):
         ellipse, onward = fit_ellipse(places, NEARLY_ROUND), np.roll(places, -1, axis=0)
-        if ellipse is None or (distance := _distance(ellipse, chain)) > ROUNDNESS_TOLERANCE:
-            if ellipse is not None and len(chain) == len(places):
+        if ellipse is None:
+            continue
+        distance = _distance(ellipse, chain)
+        if distance > ROUNDNESS_TOLERANCE:
+            if len(chain) == len(places):
                 (a, b), (x, y) = ellipse.semi_axes[0], ellipse.centres[0] % mesh.period + mesh.origin
                 polygons.append(f"semi-axes {a:.5g} and {b:.5g} around ({x:.5g}, {y:.5g}), off by {a * distance:.2g}")
             continue
@@ -98,7 +101,7 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
             ellipses += [ellipse.at(ellipse.centres - step) for step, _ in loop]
             arcs += [pairs[edges] for _, edges in loop]
     added = _with_arcs(mesh, ellipses, arcs)
-    ends, number = (curve[len(mesh.arc_edges) :] for curve in (added.arc_edges, added.arc_circle))
+    ends, number = added.arc_edges[len(mesh.arc_edges) :], added.arc_circle[len(mesh.arc_edges) :]
     advice = "these fibres are polygons; if they should be round, write coordinates with more digits"
     remarks = (f"nodes near circles or ellipses, but not on them: {first_of(polygons, len(polygons))}: {advice}",)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes)
