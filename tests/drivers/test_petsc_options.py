@@ -74,6 +74,9 @@ REFUSED = {
         "-feti_coarse_threshold 1.5": "expected a number above 0 and below 1",
         "-feti_ksp_rtol": "expected a number",
         "-feti_ksp_max_it 0": "expected an integer of at least 1",
+        "-feti_influence_columns -1": "expected an integer of at least 1",
+        "-feti_ksp_type preonly": "expected a method that iterates, such as cg",
+        "-feti_ksp_norm_type none": "expected preconditioned, unpreconditioned or natural",
         "-feti_interior_pc_type x": "expected one of cholesky, lu",
     },
     "unknown": {
@@ -82,6 +85,8 @@ REFUSED = {
     },
     "solvers": {
         "-feti_ksp_type cgg": "PETSc has no such Krylov method",
+        "-feti_natural_pc_type gamg": "preonly needs a factorization; add -feti_natural_ksp_type cg",
+        "-feti_coarse_pc_type ilu": "preonly needs a factorization; add -feti_coarse_ksp_type cg",
         "-feti_sub_pc_factor_mat_solver_type x": "",
         "-feti_schur_mat_mumps_icntl_8 -1": "INFOG(1)=-22",  # scaling by vectors that no option gives
         "-feti_interior_pc_factor_mat_solver_type nolib -feti_interior_x 1": "",
@@ -118,6 +123,23 @@ def test_options_are_refused_before_the_work(tmp_path, kind, command):
 def test_options_that_no_solver_reads_are_refused(tmp_path):
     job = command_line(1, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words_of(UNREAD))
     assert_refused(job, UNREAD, tmp_path / "out")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(
+    ("prefix", "words"),
+    [
+        ("natural", "-feti_natural_pc_type none -feti_natural_ksp_max_it 2"),
+        ("sub", "-feti_sub_pc_type lu -feti_dual_operator implicit -feti_sub_ksp_max_it 1 -feti_sub_ksp_rtol 1e-30"),
+    ],
+)
+def test_an_inner_solve_that_does_not_converge_names_its_options(tmp_path, ranks, prefix, words):
+    chosen = [f"-feti_{prefix}_ksp_type", "cg", *words.split()]
+    job = command_line(ranks, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *chosen)
+    (line,) = (line for line in job.stderr.splitlines() if line.startswith("error: "))
+    assert job.returncode == 3 and "Traceback" not in job.stderr
+    assert line.startswith(f"error: -feti_{prefix}_ksp_type cg: no convergence (KSPConvergedReason -3, iterations: ")
+    assert f"raise -feti_{prefix}_ksp_max_it" in line
 
 
 def words_of(options):

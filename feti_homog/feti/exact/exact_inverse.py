@@ -12,7 +12,6 @@ then followed from the new response.
 import numpy as np
 from petsc4py import PETSc
 
-from feti_homog.errors import CaseError
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
@@ -44,17 +43,12 @@ class ExactInverse(Preconditioner):
     def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact.  Collective.
 
-        All boundary operators must be dense.  Options: `feti_influence_columns`.
-
-        Raises:
-            CaseError: the value of the option is below 1.  Other exceptions are as in `ReferenceCell`.
+        All boundary operators must be dense.  Options: `feti_influence_columns`.  Raises like `ReferenceCell`.
         """
         comm, jump_operator = operators.comm, operators.jump_operator
         is_small = jump_operator.global_rows <= thresholds.NEVER_REFACTORED_ROWS
         max_changes = thresholds.NEVER_REFACTORED_ROWS if is_small else thresholds.INFLUENCE_COLUMNS
         max_changes = PETSc.Options("feti_").getInt("influence_columns", max_changes)
-        if max_changes < 1:
-            raise CaseError(f"-feti_influence_columns {max_changes}: expected a whole number above 0")
         self.comm, self._operators, self._max_changes = comm, operators, max_changes
         self._first, end = jump_operator.owned
         self._rows = end - self._first

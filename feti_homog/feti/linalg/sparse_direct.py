@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.feti.thresholds import MUMPS_EXTRA_WORKSPACE_PERCENT, ZERO_TOLERANCE
 from feti_homog.system.petsc import c_functions, options_database
 from feti_homog.typing import Float
@@ -25,6 +25,7 @@ Options = Mapping[str, bool | int | str]
 SINGULAR, NO_MEMORY = {-6, -10, -40}, {-5, -7, -8, -9, -11, -12, -13, -14, -15, -17, -19, -20}
 # PETSc's error code if the library has no such factorization (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
+NOT_CONVERGED = 91  # PETSC_ERR_NOT_CONVERGED
 # End of PETSc's message if CHOLMOD is out of memory.
 CHOLMOD_OUT_OF_MEMORY = "failed with status -2"
 # With these options CHOLMOD computes L L^T for small matrices, too, and fails if the matrix is indefinite: with the
@@ -121,7 +122,8 @@ def is_direct(ksp: PETSc.KSP) -> bool:
 def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float:
     """Compute X = A^-1 B (owned rows, k), in Fortran order, for B (owned rows, k).
 
-    Collective on the ranks of A.  `x` and `b` are work vectors.  Iterative methods solve column by column.
+    Collective on the ranks of A.  `x` and `b` are work vectors.  Iterative methods solve column by column.  Raises
+    ConvergenceError if an iterative method does not converge.
     """
     X = np.empty(B.shape, order="F")
     if B.shape[1] > 1 and is_direct(ksp):
@@ -133,7 +135,15 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float) -> Float
         return X
     for column, right in zip(X.T, B.T, strict=True):
         b.setArray(right)
-        ksp.solve(b, x)
+        try:
+            ksp.solve(b, x)
+        except PETSc.Error as error:
+            if error.ierr != NOT_CONVERGED:
+                raise
+            method, solver = ksp.getType(), f"-{ksp.getOptionsPrefix()}"
+            end = f"KSPConvergedReason {int(ksp.getConvergedReason())}, iterations: {ksp.getIterationNumber()}"
+            cure = f"raise {solver}ksp_max_it or {solver}ksp_rtol, or choose another {solver}pc_type"
+            raise ConvergenceError(f"{solver}ksp_type {method}: no convergence ({end}); {cure}") from error
         column[:] = x.getArray(readonly=True)
     return X
 

@@ -63,7 +63,11 @@ class ExplicitInterfaceOperator:
         self._flexibility_diagonal = both.diagonal().copy()
         # Diagonal entries are lower bounds of matrix norms.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
-        self._refines = max(conditioning, 1.0 / subdomain.compressible_share) > thresholds.ILL_CONDITIONED
+        # A ratio that the material has in its directions is no neck: there refinement would lose digits.
+        of_material = np.linalg.cond(subdomain.L) ** 2 if subdomain.material is None else np.inf
+        is_thin = subdomain.is_thin or conditioning > of_material
+        ratio = max(conditioning * is_thin, 1.0 / subdomain.compressible_share)
+        self._refines = bool(ratio > thresholds.ILL_CONDITIONED)
         np.fill_diagonal(both, 0.0)
         self._both = both
 

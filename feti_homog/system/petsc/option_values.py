@@ -132,6 +132,7 @@ SWITCH: OptionRule = "true or false, or no value", _is_switch
 PRINTS: OptionRule = "true or false, no value, or ascii:FILE of an existing folder", _is_place
 # A relative tolerance of 1 or more would end every solve at once.
 SHARE: OptionRule = "a number above 0 and below 1", lambda text: 0.0 < _real(text) < 1.0
+NORMS = ("preconditioned", "unpreconditioned", "natural")
 NEW_FILE = "a file of an existing folder, or no value"
 
 RULES: dict[str, OptionRule] = {
@@ -145,7 +146,9 @@ RULES: dict[str, OptionRule] = {
     "feti_coarse_threshold": SHARE,
     "feti_ksp_atol": ("a number of at least 0", lambda text: 0.0 <= _real(text) < math.inf),
     "feti_ksp_divtol": ("a number above 1", lambda text: 1.0 < _real(text) < math.inf),
-    "feti_ksp_max_it": _integer(1, 2**31 - 1),  # PETSc may have 32-bit integers
+    **dict.fromkeys(("feti_ksp_max_it", "feti_influence_columns"), _integer(1, 2**31 - 1)),  # 32-bit integers of PETSc
+    "feti_ksp_type": ("a method that iterates, such as cg", lambda text: text not in ("preonly", "none")),
+    "feti_ksp_norm_type": ("preconditioned, unpreconditioned or natural", NORMS.__contains__),
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
     "feti_schur_mat_mumps_icntl_19": ("no such option: MUMPS would not condense", lambda text: False),
     "feti_schur_mat_mumps_icntl_28": ("0 or 1, because one rank analyses its matrices", ("0", "1").__contains__),

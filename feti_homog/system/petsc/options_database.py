@@ -93,6 +93,8 @@ OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
 SOLVERS = {"feti_": ("feti_ksp_", "feti_pc_")} | {prefix: (prefix,) for prefix in table.DIRECT_PREFIXES}
 """Prefixes of the options that a solver reads, by the prefix of the solver."""
 NO_SUCH_METHOD = "requested KSP type"
+EXACT = ("cholesky", "lu", "qr", "svd", "redundant")
+"""PETSc's preconditioners that solve in one application, as PETSc's method `preonly` needs."""
 
 
 class _Identity:
@@ -142,6 +144,10 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
                 if prefix in table.MUMPS_PREFIXES:
                     pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
                 ksp.setFromOptions()
+                if not is_krylov and ksp.getType() == PETSc.KSP.Type.PREONLY and pc.getType() not in EXACT:
+                    words = f"-{prefix}pc_type {pc.getType()}: -{prefix}ksp_type preonly needs a factorization"
+                    faults.append(f"{words}; add -{prefix}ksp_type cg")
+                    continue
                 ksp.setErrorIfNotConverged(not is_krylov)  # MUMPS fails silently otherwise
                 ksp.setUp()
                 b.set(1.0)
