@@ -147,11 +147,11 @@ class Case:
         bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
         tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in bonds]
         tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
-        units, words = list[str](), f"above {least:g}, the stiffness of a phase: are both in one unit?"
+        units, question = list[str](), f"above {least:g}, the stiffness of a phase: are both in one unit?"
         for section, table, end in tables:
             strengths = {name: value or 0.0 for name, value in vars(table).items() if name.endswith(end)}
             high = {name: value for name, value in strengths.items() if least < value < float("inf")}
-            units += [f"[{section}] {name} = {value:g}: {words}" for name, value in high.items()]
+            units += [f"[{section}] {name} = {value:g}: {question}" for name, value in high.items()]
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:

@@ -176,8 +176,8 @@ class TipZones:
         bodies, changes = self.bodies[tips.node], np.zeros((len(reach), k, k))
         for (tree, elements), (part, of_part) in zip(self._parts, self.cell.by_part(u), strict=True):
             for t in np.flatnonzero((bodies == part.submesh.body).any(axis=1)):
-                if near := tree.query_ball_point(in_cell(self.points[tips.node[t]], self.period), reach[t]):
-                    nodes = part.mesh.triangles[np.unique(elements[near].indices)]
+                if inside := tree.query_ball_point(in_cell(self.points[tips.node[t]], self.period), reach[t]):
+                    nodes = part.mesh.triangles[np.unique(elements[inside].indices)]
                     changes[t] += self._energy_change(tips.node[t], reach[t], part, nodes, of_part, loads, grows)
         return distributed_arrays.allreduce_sum(self.cell.comm, changes)
 

@@ -23,24 +23,24 @@ LINES = {
     "case": 2880 + 31 + 120,
     "commands": 560 + 10 + 31,
     "fem": 1150 + 3 - 12,
-    "feti": 6300 + 0 + 60,
+    "feti": 6300 + 8 + 60,
     "homogenization": 3230 + 51 + 30,
     "interface": 4000 + 11 - 23,
     "materials": 1430 + 52 + 122,
-    "mesh": 5500 + 43 + 278,
+    "mesh": 5500 + 45 + 278,
     "microstructure": 2140 + 1 + 80,
-    "report": 3420 + 206 + 109,
+    "report": 3420 + 207 + 109,
     "results": 2430 + 208 + 35,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 87 + 4,
-    "system": 1770 + 17 + 0,
+    "studies": 2950 + 87 + 2,
+    "system": 1770 + 26 + 0,
     "verify": 3100 + 150 + 75,
 }
-FILES, TOTAL = 310, 45000 + 627 + 1132
+FILES, TOTAL = 310, 45000 + 645 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
-CONSTANTS, SHARED = 340, 217
+CONSTANTS, SHARED = 341, 217
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.
 VAGUE, OF, PRONOUNS = 1.0, 42.0, 1.0
 NO_NOUNS = {

@@ -98,14 +98,14 @@ def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, 
     On later legs lines end at a break if the state behind it is unknown.
     """
     points, first = document["path"], path_curves.first_leg(document)
-    table, shown = path_curves.table_of(points), path_curves.shown_components(document)
+    table, names = path_curves.table_of(points), path_curves.shown_components(document)
     later = path_curves.table_of([*points[first - 1 : first], *path_curves.later_corners(document)])
     corners = path_curves.load_controlled(points[:first])
     rising = dict(zip(table, corners.T, strict=True)) if document["case"]["path"]["method"] == "events" else None
     drawn, strains = list[Array](), voigt.voigt_names(len(points[0]["stress"]))[0]
     inks = dict(zip((*table,), 2 * [plot_helpers.STRESS_INK[name] for name in [*table][: len(strains)]], strict=False))
     folds = rising is not None and bool((np.diff([point["load_factor"] for point in points[:first]]) < 0.0).any())
-    for name in shown:
+    for name in names:
         symbol, ink = plot_helpers.SYMBOLS[name], inks[name]
         thin: dict[str, Any] = {"label": f"${symbol}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         line: dict[str, Any] = {"color": ink, "linewidth": 2.0, "linestyle": _line_style(table[name], drawn)}
@@ -122,7 +122,7 @@ def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, 
         axes.plot([], [], color="0.3", linewidth=2.0, label=f"rising {path_curves.what_rises(document)}")
     if first < len(points):
         axes.plot([], [], color="0.3", linewidth=2.0, marker="o", ms=3.5, label="later legs")
-    return shown[0] not in strains
+    return names[0] not in strains
 
 
 def _line_style(values: Array, drawn: list[Array]) -> str:
@@ -244,8 +244,9 @@ def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> di
     position = load[1:] * legs
     is_ray = by_events & (position <= 1.0 + path_curves.SAME_LOAD) & (legs == 1 or not heat.any())
     start = np.where(is_ray, load[:-1] / load[1:], 0.0)
-    given = np.array([not any(map(target.get, (*names, "temperature"))) for target in path_curves.targets(document)])
-    by_stress = broken & given[np.ceil(position - path_curves.SAME_LOAD).clip(1).astype(int) - 1]
+    targets = path_curves.targets(document)
+    legs_by_stress = np.array([not any(map(target.get, (*names, "temperature"))) for target in targets])
+    by_stress = broken & legs_by_stress[np.ceil(position - path_curves.SAME_LOAD).clip(1).astype(int) - 1]
     begin = np.where(is_ray, work[1:] - stored[1:] * (1.0 - start**2), work[:-1] + 2.0 * by_stress * np.diff(lost))
     dE, dT, C = np.diff(E, axis=0), np.diff(T), (2.0 * stored - (S * E).sum(axis=1)) / np.where(T == 0.0, np.inf, T)
     slope = np.where(by_stress[:, None], np.diff(S, axis=0) * E[1:], S[1:] * dE).sum(axis=1) + C[1:] * dT

@@ -258,8 +258,8 @@ def _stress_error(document: Document) -> list[str]:
     points = [document.get("load", {}), *document.get("path", ()), *document.get("angle", ())]
     energies = [point.get("mesh_error") for point in points] + [(document.get("mesh_error") or {}).get("energy")]
     error = without_noise(max(energy or 0.0 for energy in energies) ** 0.5)
-    words = f"about {100 * error:.2g} % in the root mean square, at their peaks perhaps more"
-    return [f"  mesh error of stresses: {words}"] if error else []
+    estimate = f"about {100 * error:.2g} % in the root mean square, at their peaks perhaps more"
+    return [f"  mesh error of stresses: {estimate}"] if error else []
 
 
 def _states(document: Document, count: int) -> Sequence[int]:

@@ -145,8 +145,8 @@ def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
                     pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
                 ksp.setFromOptions()
                 if not is_krylov and ksp.getType() == PETSc.KSP.Type.PREONLY and pc.getType() not in EXACT:
-                    words = f"-{prefix}pc_type {pc.getType()}: -{prefix}ksp_type preonly needs a factorization"
-                    faults.append(f"{words}; add -{prefix}ksp_type cg")
+                    fault = f"-{prefix}pc_type {pc.getType()}: -{prefix}ksp_type preonly needs a factorization"
+                    faults.append(f"{fault}; add -{prefix}ksp_type cg")
                     continue
                 ksp.setErrorIfNotConverged(not is_krylov)  # MUMPS fails silently otherwise
                 ksp.setUp()

@@ -79,6 +79,6 @@ def test_a_temperature_near_zero_is_measured_by_the_largest(rounding, holds):
         states.append(SimpleNamespace(name=f"state {number}", point=number, temperature=reached, **zeros))
     files = SimpleNamespace(document={"angle": [None] * 3})
     cell = SimpleNamespace(files=files, reuss=np.eye(6), largest_strain=0.01, loads=lambda strain, temperature: strain)
-    findings = Findings(checks(1e-8, False, has_coatings=False))
+    findings = Findings(checks(1e-8, False))
     check_loads(findings, cell, states, rows)
     assert all(finding.holds for finding in findings.worst()) is holds
