@@ -43,9 +43,12 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
         if path.increments is not None and path.increments < len(placed):
             faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
     for kind, section in (("load", load), ("path", path)):
-        for place, target in section.placed.items() if section is not None else ():
-            if load_sections.TEMPERATURE in load_sections.named(target):
-                heated.append(f"[{kind}] {place}.{load_sections.TEMPERATURE}")
+        placed = {} if section is None else section.placed
+        heated += [
+            f"[{kind}] {place}.{load_sections.TEMPERATURE}"
+            for place, target in placed.items()
+            if load_sections.TEMPERATURE in load_sections.named(target)
+        ]
     if envelope is not None and envelope.temperature is not None:
         heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:
