@@ -52,7 +52,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases one standard deviation below and above the mean of each number in `names`."""
+        """Return the cases with one of `names` one standard deviation below or above its mean, others at their means."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         return self.cases([{tuple(name.split(".")): end} for name, end in ends], mesh_error=False)
 
