@@ -67,7 +67,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
 def _note_bounds(
     context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
 ) -> None:
-    """Note conductivities across the fibres outside their bounds; see `constants.note_outside`."""
+    """Compare k across the fibres with bounds, Hashin-Shtrikman's if isotropic, else Wiener's, by `note_outside`."""
     least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
     error = np.asarray(errors[:2, :2].max())
     limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener

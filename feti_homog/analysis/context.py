@@ -73,7 +73,7 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the largest ratio of a strain to the strain of the bonded cell.  Collective."""
+        """Return the largest `LoadScales.excess` of the states of responses.  Collective."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 

@@ -165,7 +165,7 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the only entry of the list `table` if it is a list, or a table and `name` no number; else `table`."""
+    """Return the entry of a list with one list or, unless `name` is a number, one table; else return `table`."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 

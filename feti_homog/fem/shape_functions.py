@@ -195,7 +195,7 @@ class ElementFields:
 
     @classmethod
     def of(cls, problem: Problem, points: Float, u: Float, A: Float, loads: Float, is_mixed: bool) -> ElementFields:
-        """Compute the fields from nodes (e, a, 2), displacements u (e, a, c, k), laws A (v, v) and strains (m, k)."""
+        """Compute the fields from nodes (e, a, 2), u (e, a, c, k), stiffness A, and strains `loads` (m, k) to add."""
         if not is_mixed:
             g, w = gradients(points)
             grad_u = slopes(g, u)

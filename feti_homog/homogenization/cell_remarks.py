@@ -113,7 +113,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on missing expansions, then on sides that are not periodic, or on order, seed, teeth and fraction.
+    """List remarks on missing expansions, then on nonperiodic sides or else order, scatter, teeth and fibre fraction.
 
     `bonds` is the number of bonds with teeth, 0 if unknown.
     """

@@ -67,7 +67,7 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """Whether several subdomains share a body or, across materials, the cell."""
+        """Whether a body or, if subdomains reach across materials, the cell has several subdomains."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property

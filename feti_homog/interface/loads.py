@@ -203,21 +203,21 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Return the load sizes (v,) of a state, clipped by `asked` (v,), as scales for errors.
+        """Return the load sizes |`strain`| (v,) of a state as scales for errors, with strains clipped.
 
-        The range of a strain is [`bound_ratio` `asked`, ABSURD times the largest strain of `asked`]; other loads stay.
-        The lower bound matters where a path with friction returns to zero stress.
+        The lower limit of a strain, `bound_ratio` times its size in `asked` (v,), matters where a path with friction
+        returns to zero stress.  The upper limit is ABSURD times the largest strain that `asked` imposes.
         """
         sizes, m = np.abs(strain), self.solver.problem.strains
         sizes[:m] = np.clip(sizes[:m], self.bound_ratio * asked[:m], ABSURD * self.imposed_strain(asked).max())
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of the largest strain of a state (v,) to the largest of `asked` (v,); 0 if `asked` is 0."""
+        """Return the ratio of the largest imposed strains of a state (v,) and of `asked` (v,); 0 if `asked` is 0."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """Return the strain sizes, (m,) or (m, n), that loads (v,) or (v, n) cause in the bonded cell.
+        """Return strain sizes, (m,) or (m, n), of loads (v,) or (v, n): strains plus the largest free thermal strains.
 
         Entries after the first v, the stresses of tractions on the sides, follow from the first v and do not count.
         """
@@ -264,7 +264,7 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     """Mark strains (v,) under prescribed stresses that a motion without stiffness changes.  Collective.
 
     Under such a strain, rigid motions of the torn bodies close all active jumps, and the bodies bear no stress: only
-    debonded faces open.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is the cell area times <L>.
+    debonded faces move apart.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is the cell area times <L>.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]

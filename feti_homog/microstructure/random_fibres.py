@@ -107,10 +107,10 @@ def wanted_distances(measured: FibrePattern, count: int) -> Float:
 
 
 def match_distance(pattern: FibrePattern, wanted: Float) -> float:
-    """Compare neighbour distances in a periodic pattern with the target `wanted` (N, SHELLS).
+    """Compare neighbour distances in a periodic pattern with the target `wanted` (N, SHELLS), in mean diameters.
 
-    Returns the root mean square difference between the sorted distances, in mean diameters. This is the quadratic
-    Wasserstein distance of the distributions, over both neighbours.
+    Returns the root mean square difference between the sorted distances of the nearest and second neighbours, in mean
+    diameters. This is the quadratic Wasserstein distance of the distributions.
     """
     near = nearest_neighbours(pattern, SHELLS).distances / (2 * pattern.mean_radius)
     return sqrt(_mean_square(near, wanted))

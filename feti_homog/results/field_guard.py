@@ -30,7 +30,7 @@ def require_own(path: Path, state: int | None = None) -> None:
 
     The check refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than
     the file or outside it; other layouts; a damaged mesh or case; numbers outside RANGES, in all states or in one
-    `state`.  Raises CaseError for these faults and a missing file, FetiHomogError for missing permissions.
+    `state`.  Raises CaseError for these faults, a missing file or a failed child, FetiHomogError without permission.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()

@@ -42,7 +42,7 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
 
 
 def changed_components(document: Document, leg: int | None = None) -> list[int]:
-    """Return the indices of the components that waypoint `leg`, from 1, changes; by default, that any changes."""
+    """Return the indices of the components that change at waypoint `leg`, from 1, or by default at any waypoint."""
     pairs, matches = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for number, target in enumerate(targets(document), start=1):

@@ -87,7 +87,7 @@ class Fit(Study):
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on measured names that have another meaning in ply axes; empty without such names."""
+        """Return a line on names in spatial tests with another meaning in ply axes; empty without such names."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))

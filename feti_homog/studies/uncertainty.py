@@ -52,7 +52,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases one standard deviation below and above the mean of each number in `names`."""
+        """Return the cases with one of `names` a standard deviation below or above its mean, others at their means."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         return self.cases([{tuple(name.split(".")): end} for name, end in ends], mesh_error=False)
 
@@ -179,7 +179,7 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return placeholder data, for paths load factors and peaks; CaseError if only some results have these numbers."""
+    """Return placeholder data, of paths only loads and peak components; CaseError if only some paths break or fall."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone

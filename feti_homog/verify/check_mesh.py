@@ -217,7 +217,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that an energy error is not far below the sum of element errors, and this sum itself under unit loads."""
+    """Check that an energy error is not far below the sum of element errors; recompute the sum under unit loads."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

@@ -172,7 +172,7 @@ class ContactProblem:
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
 
-        Tries a load that open faces do not carry with closed faces.  Raises like `linear` and `FloatingBodies.place`.
+        Closes the open faces if they do not carry the load.  Raises like `linear` and `FloatingBodies.place`.
         """
         try:
             return self._search(load, bonds, start)
@@ -208,7 +208,7 @@ class ContactProblem:
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark strains (v,) that open faces leave free under prescribed stresses; none with friction.  Collective."""
+        """Mark strains (v,) that debonding leaves free under prescribed stresses; none with friction.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)

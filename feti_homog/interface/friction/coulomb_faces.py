@@ -129,7 +129,7 @@ class StatusSearch:
                 yield trial, x
 
     def by_continuation(self, status: Status) -> Found:
-        """Search by pivots while friction rises in steps from zero to mu.  Steps start from the last statuses."""
+        """Search by pivots as friction rises from zero to mu, in steps from the last statuses; None at tiny steps."""
         fraction, step, faces = 0.0, 0.5, copy(self.faces)
         search = replace(self, faces=faces)
         while step >= 1.0 / MOST_TRIED:

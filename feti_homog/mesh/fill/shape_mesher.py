@@ -35,7 +35,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh convex outlines; arguments as in `UnmeshedCell`.  raises like `refuse_many` and `filled`."""
+    """Mesh convex outlines; arguments as in `UnmeshedCell`.  Raises like `refuse_many` and `filled`."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:

@@ -76,7 +76,7 @@ def flat(mesh: RawMesh) -> list[str]:
 
 
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
-    """List different nodes at the same position."""
+    """List pairs of nodes at the same position in the plane; if there are MOST_PAIRS or more, perhaps not all."""
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T
@@ -172,7 +172,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def _nearest(plane: Float, places: Float, free: Float) -> str:
-    """Name the distance of `places` (k, 2) from nodes `free` (m, 2) of `plane` (n, 2); propose to snap clear pairs."""
+    """Name the distance of `places` (k, 2) from nodes `free` (m, 2) of `plane` (n, 2); propose to snap unique pairs."""
     away, nearest = cKDTree(free).query(places)
     distance, step = float(away.max(initial=0.0)), cKDTree(plane).query(free[nearest], 2)[0][:, 1].min(initial=np.inf)
     is_clear = 2 * distance < step and len(np.unique(nearest)) == len(nearest)

@@ -271,6 +271,6 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Select constants for tables: SHOWN; for a load and secants in space the first MOST, diagonal entries before."""
+    """Select constants for tables: SHOWN or, of loads and secants in space, the first MOST, off-diagonals last."""
     chosen = sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]
     return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else chosen

@@ -100,7 +100,7 @@ def _landmark(document: Document, peak: Document, title: str) -> str:
 
 
 def _load_at(document: Document, number: int, name: str, strain: float) -> str:
-    """Return the strain at a point with its name, if any; on a leg that changes the temperature alone, this instead."""
+    """Write the strain of a point with its name, if any, or the temperature on a leg that changes only temperature."""
     if (temperature := path_curves.temperature_of(document, number)) is not None:
         name, strain = load_sections.TEMPERATURE, temperature
     return f"{name} = {without_noise(strain):.6g}".removeprefix(" = ")
