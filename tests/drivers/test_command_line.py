@@ -155,7 +155,7 @@ def test_what_is_no_folder_of_a_result_is_named(tmp_path, command):
     assert job.returncode == 2
     assert job.stderr.startswith(f"error: {path}: expected the folder of a result, not a file\n")
     (tmp_path / "fit.json").touch()
-    assert f"{tmp_path} has a study: see fit.json and fit.png" in in_process(command, tmp_path).stderr
+    assert f"{tmp_path} has a study: see fit.json, fit.png" in in_process(command, tmp_path).stderr
     (tmp_path / "fit.json").rename(tmp_path / "sweep.json")
     job = in_process(command, tmp_path)
     assert job.returncode == 2 and "not that of a sweep; `feti-homog collect" in job.stderr

@@ -65,7 +65,7 @@ CASES: dict[str, tuple[str, str]] = {
         petsc('feti_ksp_type = "gmres"', 'feti_ksp_gmres_restart = "abc"'),
         "-feti_ksp_gmres_restart abc: ",
     ),
-    "no such norm": (petsc('feti_ksp_norm_type = "foo"'), "-feti_ksp_norm_type foo: Unknown option foo"),
+    "no such norm": (petsc('feti_ksp_norm_type = "foo"'), "-feti_ksp_norm_type foo: expected preconditioned, "),
     "side that the method lacks": (petsc('feti_ksp_pc_side = "right"'), "-feti_ksp_pc_side right: "),
     "neither true nor false": (
         petsc('feti_ksp_initial_guess_nonzero = "maybe"'),
