@@ -44,7 +44,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     failed = [(e, s) for e, s in zip(index.entries, states, strict=True) if s.status in case_folders.WITHOUT_RESULT]
     lines = [*case_folders.failure_lines(failed, index.stress_unit), *means(table)]
     peaks = [landmarks.peak_of(document) for document in table.finished if "path" in document]
-    rising = sum("stress_left" not in peak and any(key.startswith("first_") for key in peak) for peak in peaks)
+    rising = sum("stress_left" not in peak and "event" in peak for peak in peaks)
     if rising:
         of_paths = f"{rising} of {len(peaks)} paths end before their stress falls"
         lines.append(f"remark: {of_paths}: load them further for a peak")

@@ -6,10 +6,11 @@ from support.sweep_tables import path_document
 from feti_homog.studies import case_folders, collect
 
 
+@pytest.mark.parametrize("breaks", [True, False])
 @pytest.mark.parametrize("rising", [0, 1, 2])
-def test_paths_whose_stress_does_not_fall_are_counted(tmp_path, monkeypatch, rising):
+def test_paths_whose_stress_does_not_fall_are_counted(tmp_path, monkeypatch, rising, breaks):
     falling = path_document(2, 0.0)
-    short = falling | {"path": falling["path"][:1]}
+    short = falling | {"path": [point if breaks else point | {"broke": 0} for point in falling["path"][:1]]}
     entries = tuple(case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k in (1, 2))
     documents = [*[short] * rising, *[falling] * (2 - rising)]
     found = [case_folders.CaseState(case_folders.Status.DONE, "", document) for document in documents]
