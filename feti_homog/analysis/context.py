@@ -22,7 +22,7 @@ from feti_homog.system.runtime import standard_streams
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.homogenization import mesh_estimate
+    from feti_homog.homogenization import energy_release, mesh_estimate
     from feti_homog.results import checkpoints
 
 
@@ -181,9 +181,10 @@ class AnalysisContext:
         from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
         errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
-        for problem, group in zip(self.loads.problems, groups, strict=False):
+        zones = self.tip_zones if has_tips else [None] * len(groups)
+        for problem, group, of_problem in zip(self.loads.problems, groups, zones, strict=False):
             touches = problem.interface.contact and any(response.debonded for response in group)
-            errors.append(mesh_estimate.energy_errors(problem.cell, group, touches))
+            errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, zones=of_problem))
             shares = errors[-1].shares.T
             estimated += [replace(response, shares=part) for response, part in zip(group, shares, strict=True)]
         return errors, estimated
@@ -218,6 +219,13 @@ class AnalysisContext:
         pieces = f"{self.cell.summary.subdomains} subdomains on {comm.size} ranks, {jumps.global_rows} multipliers"
         digest = mpi_errors.on_root(comm, self.case.digest, False)  # events are the same for any [output]
         return checkpoints.Checkpoint(self.directory, comm, f"case {digest}, {pieces}\n{self.opening(self)}", room)
+
+    @cached_property
+    def tip_zones(self) -> list[energy_release.TipZones]:
+        """Return the zones about tips of arcs in each problem.  Collective when first read."""
+        from feti_homog.homogenization import energy_release  # bonded cells have no tips
+
+        return [energy_release.TipZones(problem.cell) for problem in self.loads.problems]
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:

@@ -43,10 +43,10 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
 
     A unit load has one response, in the problem with a load of this name; other loads have one in each problem.
     """
-    rates, debonded = list[tuple[energy_release.EnergyRelease, str]](), any(r[0].debonded for r in responses.values())
-    zones = [(problem, energy_release.TipZones(problem.cell)) for problem in context.loads.problems if debonded]
+    rates = list[tuple[energy_release.EnergyRelease, str]]()
     for load, parts in responses.items():
         if parts[0].debonded and not load.endswith("temperature"):
+            zones = [*zip(context.loads.problems, context.tip_zones, strict=True)]
             loaded = [(problem, zone) for problem, zone in zones if load.lstrip("-") in problem.loads] or zones
             pairs = zip(loaded, parts, strict=False)
             at = [zone.release(part, problem.interface) for (problem, zone), part in pairs]

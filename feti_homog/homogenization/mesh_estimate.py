@@ -25,6 +25,7 @@ from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
     from feti_homog.homogenization.cut_bodies import SharedVertices
+    from feti_homog.homogenization.energy_release import TipZones
 
 # Ratios of element and arc errors to the errors on coarser meshes (`scripts/measure_mesh_error.py --factors`).  NESTED:
 # one and two halvings fewer, by element order.  LOCKED: cells with a phase that locks; of quadratic elements, true
@@ -76,13 +77,18 @@ class EnergyErrors:
 
 
 def energy_errors(
-    cell: TornCell, responses: Sequence[Response], contact: bool = False, nested: bool | None = None
+    cell: TornCell,
+    responses: Sequence[Response],
+    contact: bool = False,
+    nested: bool | None = None,
+    zones: TipZones | None = None,
 ) -> EnergyErrors:
     """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
         contact: whether faces touch.
         nested: whether to use the coarser mesh; by default the result of `is_nested`.
+        zones: about the tips of debonded responses; found here by default.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
@@ -90,11 +96,11 @@ def energy_errors(
     fewer = cell.lattice.halvings - lattice.halvings
     sums, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
     of_elements, of_arcs = factors(cell, fewer)
-    zones = singular = None
+    singular = None
     if any(response.debonded for response in responses):
-        from feti_homog.homogenization.energy_release import TipZones  # bonded cells have no tips
+        from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
-        zones = TipZones(cell)
+        zones = zones or energy_release.TipZones(cell)
         singular = zones.singular(responses[0])
     for stress, sides in _recovered(cell, responses, lattice):
         places = stress.points[stress.triangles[:, :3]].mean(axis=1), sides.points[:, [0, -1]].mean(axis=1)

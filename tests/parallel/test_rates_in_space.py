@@ -62,7 +62,7 @@ def test_the_rates_of_all_loads_are_what_the_energy_loses(comm, load, case, erro
 
 @pytest.mark.parametrize("opening", [60.0, 140.0, 260.0])
 def test_one_fibre_under_axial_shear_has_the_exact_rates(comm, opening):
-    """In a cell 40 radii wide, whose stress is that of the matrix far away.
+    """The cell is 40 radii wide, so that the matrix has its stress far from the fibre.
 
     The exterior of an arc of the half angle t is the image of the exterior of a circle under the map
     R w (w + s) / (1 + s w), s = 1 / sin(t / 2).  Without a fibre, this gives

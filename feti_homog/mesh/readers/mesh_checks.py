@@ -76,7 +76,7 @@ def flat(mesh: RawMesh) -> list[str]:
 
 
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
-    """List pairs of nodes at the same position in the plane; if there are MOST_PAIRS or more, perhaps not all."""
+    """List pairs of nodes at one position in the plane.  A list of MOST_PAIRS or more may be incomplete."""
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T

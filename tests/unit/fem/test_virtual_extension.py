@@ -19,7 +19,7 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.1], [0.2, 0.9]])
 
 
 def energy_change(points, u, A, uniform, moved, changed, is_mixed=False):
-    """Return the rate of the energy of one load, by the fields of the elements."""
+    """Return dW/ds under one load from the element fields."""
     problem = PLANE if u.shape[2] == 2 else AXIAL_SHEAR
     fields = ElementFields.of(problem, points, u[..., None], A, np.zeros((problem.strains, 1)), is_mixed)
     return fields.change(A, uniform[:, None], moved, changed[..., None]).item() / 2
@@ -87,7 +87,7 @@ def test_so_it_is_under_uniform_loads_and_in_axial_shear(order, A, uniform):
 
 
 def test_uniform_loads_change_mixed_elements_as_they_change_others():
-    """A nearly constant pressure: the loads' part of the energy is that of a quadratic triangle."""
+    """Under a nearly constant pressure both kinds of triangle have equal energies of the loads."""
     rng = np.random.default_rng(7)
     points, u = elements(2, rng)
     points[:, 3:] = (points[:, :3] + np.roll(points[:, :3], -1, axis=1)) / 2

@@ -9,7 +9,7 @@ from feti_homog.homogenization import mesh_estimate
 
 
 def group(points, sides, first):
-    """Return a body of one quadratic triangle with `sides` on an arc and forces from row `first` on."""
+    """Return a body: one quadratic triangle, its `sides` on an arc, and its first force row `first`."""
     nodes = np.array([[0, 3, 1], [1, 4, 2]])[:sides]
     places = np.concatenate([points, (points + np.roll(points, -1, axis=0)) / 2])
     stress = SimpleNamespace(

@@ -1,4 +1,4 @@
-"""Curves of later legs against a law of one bar, whose stiffness falls in breaks: no chords across them."""
+"""Later legs are drawn as a bar behaves whose stiffness falls in breaks: with drops, without chords."""
 
 from typing import Any
 
