@@ -31,11 +31,13 @@ class Prescribed:
         by_stress: (v,) whether a load prescribes the stress.
         values: (v,) strains, or (S x)_E where a load prescribes the stress.
         slip: (n,) slip at sticking nodes.
+        pressure: (n,) scaled pressure added at the nodes; 0 except in a search.
     """
 
     by_stress: Bool
     values: Float
     slip: Float
+    pressure: Float | float = 0.0
 
 
 class FaceSystem:
@@ -68,6 +70,25 @@ class FaceSystem:
         """Return the scaled normal and tangential forces (n,) in a state x, tension positive."""
         f = -self.product(x)
         return f[self.gaps], f[self.slips]
+
+    def rooms(self, status: Status, x: Float, slip: Float | float, pressure: Float | float) -> Float:
+        """Return how far nodes are from other statuses, forces and jumps (4, n); inf where another limit comes first.
+
+        The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with the added
+        pressure; g_n is the room of an open node, in the row STICK.
+        """
+        normal, tangential = self.forces(x)
+        total, sticks, closed = pressure - normal, status == status_system.STICK, status != status_system.OPEN_FACE
+        limit, slides = self.friction * total, closed & ~sticks & (self.friction > 0.0)
+        reversal = np.where(slides, status * (x[self.slips] - slip), np.inf)
+        return np.stack(
+            [
+                np.where(closed, reversal, x[self.gaps]),
+                np.where(sticks, limit - tangential, np.inf),
+                np.where(closed, total, np.inf),
+                np.where(sticks, limit + tangential, np.inf),
+            ]
+        )
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
         """Take over the factored response of `before`, changed in place by `FollowedStatuses.grow`, if it can grow."""
@@ -156,12 +177,14 @@ class FaceSystem:
         return np.asarray(np.abs(rows) + self.terms(self.terms(fixed)))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with `start` in free entries, and the right-hand side (m,), 0 except in the load rows."""
+        """Return x (m,) with `start` in free entries, and the right-hand side (m,): loads, and added pressures."""
         x, rows = start.copy(), np.zeros(len(start))
         x[self.gaps] = np.where(status == status_system.OPEN_FACE, x[self.gaps], 0.0)
         x[self.slips] = np.where(status == status_system.STICK, load.slip, x[self.slips])
         x[self.loads] = np.where(load.by_stress, x[self.loads], load.values)
         rows[self.loads] = load.values
+        rows[self.gaps] = np.where(status == status_system.OPEN_FACE, -load.pressure, 0.0)
+        rows[self.slips] = np.where(np.abs(status) == 1, -status * self.friction * load.pressure, 0.0)
         return x, rows
 
     def noise(self, x: Float) -> Float:
