@@ -70,7 +70,7 @@ class SweepSection:
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
         types.integer(least=1, most=types.MOST_ROWS),
-        "Number of random arrangements at each point; the k-th has the seed [cell] seed + k - 1 at all points.",
+        "Random arrangements at each point, with seeds that count up from [cell] seed; or give a list of cell.seed.",
         default=None,
     )
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.report.text import constant_tables, point_tables, tables
-from feti_homog.results import atomic, landmarks, result_json
+from feti_homog.results import atomic, result_json
 from feti_homog.studies import case_folders
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.predictions import responses
@@ -34,19 +34,18 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv|moduli\.png"), alone=False)
+    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv|(moduli|peaks)\.png"), alone=False)
     paths = write(directory, table)
     if pictures:
-        from feti_homog.studies.pictures import draw_moduli  # only a rank that draws loads Matplotlib
+        from feti_homog.studies.pictures import draw_over_fractions  # only a rank that draws loads Matplotlib
 
-        paths += draw_moduli(directory, table)
+        paths += draw_over_fractions(directory, table)
     counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
     failed = [(e, s) for e, s in zip(index.entries, states, strict=True) if s.status in case_folders.WITHOUT_RESULT]
     lines = [*case_folders.failure_lines(failed, index.stress_unit), *means(table)]
-    peaks = [landmarks.peak_of(document) for document in table.finished if "path" in document]
-    rising = sum("stress_left" not in peak and "event" in peak for peak in peaks)
-    if rising:
-        of_paths = f"{rising} of {len(peaks)} paths end before their stress falls"
+    if table.rising:
+        paths_of_all = sum("path" in document for document in table.finished)
+        of_paths = f"{len(table.rising)} of {paths_of_all} paths end before their stress falls"
         lines.append(f"remark: {of_paths}: load them further for a peak")
     lines += case_folders.note_lines(index.entries, states)
     rows = zip(table.folder, table.status, table.reason, strict=True)

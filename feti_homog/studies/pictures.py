@@ -1,4 +1,4 @@
-"""Draw moduli.png (moduli of a sweep over the fibre fraction) and fit.png (residuals and fit curves)."""
+"""Draw moduli.png or peaks.png (a sweep over the fibre fraction) and fit.png (residuals and fit curves)."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -37,24 +37,32 @@ NAMES = {
 }
 
 
-def draw_moduli(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw moduli over varying fibre fractions.  Returns [path of moduli.png], [] if nothing is drawn.  On one rank."""
-    if not varies(table, FRACTION) or not panels_of(table):
+def draw_over_fractions(directory: Path, table: SweepTable) -> list[Path]:
+    """Draw moduli, or the onsets and peaks of paths, over varying fibre fractions.  On one rank.
+
+    Returns the path of moduli.png or peaks.png in a list; [] if nothing is drawn.
+    """
+    names = panels_of(table) if varies(table, FRACTION) else ()
+    if not names:
         return []
     with mpl.rc_context(plot_helpers.STYLE):
-        return [plot_helpers.save(moduli_figure(table), directory / "moduli.png")]
+        path = directory / ("peaks.png" if names[0] not in NAMES else "moduli.png")
+        return [plot_helpers.save(figure_over_fractions(table), path)]
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """Return the names of the outputs to draw; empty for cases without moduli."""
+    """Return the names of the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)
+    peaks = [name for name in table.stated if name.startswith("peak_S")]
+    onsets = [name.replace("peak", "onset") for name in peaks]
+    choices = (*choices, tuple(onsets if table.rising else onsets + peaks))
     return next((names for names in choices if all(name in table.outputs for name in names)), ())
 
 
-def moduli_figure(table: SweepTable) -> Figure:
-    """Draw the moduli over the fibre fraction, with the bounds that the results have.
+def figure_over_fractions(table: SweepTable) -> Figure:
+    """Draw the panels over the fibre fraction, with the bounds that the results have.
 
     Generalized plane strain has further panels for Poisson's ratios and thermal expansions.
     """
@@ -69,7 +77,8 @@ def moduli_figure(table: SweepTable) -> Figure:
             _plot_series(axes, table, one_series, name, number)
         unit = "" if name.startswith(("nu_", "expansion_", "k")) else plot_helpers.stress_label(table.stress_unit)
         shear = r" ($\gamma_{12}$)" if name == "C33" and names == [*PANELS] else ""
-        axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]}{shear}\n{unit}".rstrip())
+        title = NAMES.get(name, name.replace("_S", " $S_{") + "}$")
+        axes.set(xlabel="fibre fraction", ylabel=f"{title}{shear}\n{unit}".rstrip())
         _limit(axes)
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)

@@ -1,6 +1,7 @@
 """Expand a sweep file into numbered cases, and check every case."""
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -150,7 +151,8 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the sweep cases, unchecked, with their documents; [] after faults, which are appended to `faults`.
 
-    The cases run through all points; further `realisations`, if not None, follow at points with a random cell.
+    The cases run through all points; further `realisations`, if not None, follow at points with a random cell.  Points
+    that differ by their seeds alone are realisations of one point.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
     if realisations is not None and documents and not any(map(_is_random, documents)):
@@ -159,17 +161,22 @@ def case_documents(
     if realisations is not None and "cell.seed" in keys:
         faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed; seeds count up from the seed in [cell]")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
-    ordered = list[tuple[SweepCase, dict[str, Any]]]()
+    ordered, numbers, counts = list[tuple[SweepCase, dict[str, Any]]](), dict[int | str, int](), Counter[int]()
     for realisation in range(1, (realisations or 1) + 1) if not faults else ():
-        for number, (point, document) in enumerate(zip(points, documents, strict=True), start=1):
+        for place, (point, document) in enumerate(zip(points, documents, strict=True)):
             inputs, varied = _inputs(point), document
+            group: int | str = place
             if realisations is not None and _is_random(document):
                 first = document["cell"].get("seed", 0)  # seed of realisation 1; a later check reports a faulty seed
                 inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
                 varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
             elif realisation > 1:
                 continue
-            ordered.append((SweepCase(len(ordered) + 1, number, realisation, inputs, ""), varied))
+            elif "cell.seed" in inputs:
+                group = repr({name: value for name, value in inputs.items() if name != "cell.seed"})
+            number = numbers.setdefault(group, len(numbers) + 1)
+            counts[number] += 1
+            ordered.append((SweepCase(len(ordered) + 1, number, counts[number], inputs, ""), varied))
     return ordered
 
 

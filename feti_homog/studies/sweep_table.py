@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from feti_homog.report.text import tables
-from feti_homog.results import path_curves
+from feti_homog.results import landmarks, path_curves
 from feti_homog.studies.estimation import CONFIDENCE
 from feti_homog.typing import Document, Float
 
@@ -96,6 +96,12 @@ class SweepTable:
     def finished(self) -> list[Document]:
         """The contents of result.json for all finished cases."""
         return [document for document in self.documents if document is not None]
+
+    @cached_property
+    def rising(self) -> list[Document]:
+        """The results of finished paths whose stress does not fall before their end."""
+        peaks = [(result, landmarks.peak_of(result)) for result in self.finished if "path" in result]
+        return [result for result, peak in peaks if "stress_left" not in peak and "event" in peak]
 
     def input_of(self, point: int, name: str) -> Any:
         """Return the value of an input at a point, or None if the point does not set the input."""

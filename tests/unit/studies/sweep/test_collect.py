@@ -168,9 +168,9 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
 @pytest.mark.slow
 def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
-    assert not pictures.draw_moduli(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
+    assert not pictures.draw_over_fractions(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
     waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
-    assert not pictures.draw_moduli(tmp_path, waiting)
+    assert not pictures.draw_over_fractions(tmp_path, waiting)
 
 
 def test_bars_are_the_mean_errors_of_the_mesh():
@@ -179,7 +179,7 @@ def test_bars_are_the_mean_errors_of_the_mesh():
     documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
     assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
-    panel = (figure := pictures.moduli_figure(table)).axes[pictures.PANELS.index("bulk")]
+    panel = (figure := pictures.figure_over_fractions(table)).axes[pictures.PANELS.index("bulk")]
     shear = figure.axes[pictures.PANELS.index("C33")].get_ylabel()
     assert shear.startswith(r"$C_{33}$ ($\gamma_{12}$)") and "gamma" not in panel.get_ylabel()
     assert {"realisations", "95 % confidence of the mean"} <= {each.get_text() for each in figure.legends[0].texts}
@@ -189,7 +189,7 @@ def test_bars_are_the_mean_errors_of_the_mesh():
 
 
 def assert_drawn(folder, table, names):
-    paths = pictures.draw_moduli(folder, table)
+    paths = pictures.draw_over_fractions(folder, table)
     assert [path.name for path in paths] == names
     for path in paths:
         picture = imread(path)
@@ -231,7 +231,7 @@ def test_bands_are_the_mean_bounds_in_the_results():
     for each, low in zip(documents, (1.0, 2.0, 3.0, 6.0), strict=True):
         each["fibre_bounds"] = {"E_axial": [low, 2 * low], "nu_axial": None}
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
-    axes = pictures.moduli_figure(table).axes
+    axes = pictures.figure_over_fractions(table).axes
     ends = [[line for line in panel.lines if line.get_label() == "Hill and Hashin bounds"] for panel in axes]
     assert [len(each) for each in ends[:4]] == [2, 0, 0, 0]
     assert [line.get_xydata().tolist() for line in ends[0]] == [[[0.2, 2.0], [0.4, 4.0]], [[0.2, 4.0], [0.4, 8.0]]]
@@ -251,7 +251,7 @@ def test_bounds_have_the_colours_of_their_lines_and_leave_the_lines_high():
     for each, size in zip(documents, (10.0, 20.0, 11.0, 21.0), strict=True):
         each["transversely_isotropic"] = dict.fromkeys(each["transversely_isotropic"], size)
         each["fibre_bounds"] = {"E_axial": [size - 1.0, size + 2.0], "G_axial": [size, 1000.0]}
-    several = pictures.moduli_figure(collected(keys, documents, [1, 2, 3, 4], [1] * 4)).axes
+    several = pictures.figure_over_fractions(collected(keys, documents, [1, 2, 3, 4], [1] * 4)).axes
     ends = [line for line in several[0].lines if line.get_label() == "Hill and Hashin bounds"]
     assert [line.get_color() for line in ends] == [ink for ink in plot_helpers.INK[:2] for _ in range(2)]
     assert [line.get_ydata().tolist() for line in ends] == [[9.0, 19.0], [12.0, 22.0], [10.0, 20.0], [13.0, 23.0]]
@@ -265,7 +265,7 @@ def test_secants_in_space_are_drawn_without_bounds(tmp_path):
         del each["constants"], each["transversely_isotropic"]
     table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
     assert pictures.panels_of(table) == ("C11", "C33", "C44", "C66")
-    figure = pictures.moduli_figure(table)
+    figure = pictures.figure_over_fractions(table)
     assert figure.get_suptitle().endswith("plane generalized")
     assert not any("gamma" in axes.get_ylabel() for axes in figure.axes)
     assert_drawn(tmp_path, table, ["moduli.png"])

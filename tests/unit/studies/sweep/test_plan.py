@@ -105,6 +105,12 @@ def test_realisations_are_seeds_and_come_last():
     assert sweep.entries[:4] == fewer.entries
 
 
+def test_seeds_in_a_list_are_realisations_of_one_point():
+    sweep = expanded("cell.seed = [4, 9]\ncell.fibre_fraction = [0.2, 0.3]", RANDOM)
+    found = [(e.point, e.realisation, e.inputs["cell.fibre_fraction"], e.inputs["cell.seed"]) for e in sweep.entries]
+    assert found == [(1, 1, 0.2, 4), (2, 1, 0.3, 4), (1, 2, 0.2, 9), (2, 2, 0.3, 9)]
+
+
 def test_sections_vary_as_tables_and_only_random_cells_have_realisations():
     case = CASE.replace('geometry = "hexagonal"\n', "")
     table = "realisations = 2\ncell = [{geometry = 'square'}, {geometry = 'random', fibres = 3}]"

@@ -1,9 +1,9 @@
 """Paths of a sweep that end before their stress falls."""
 
 import pytest
-from support.sweep_tables import path_document
+from support.sweep_tables import collected, path_document
 
-from feti_homog.studies import case_folders, collect
+from feti_homog.studies import case_folders, collect, pictures
 
 
 @pytest.mark.parametrize("breaks", [True, False])
@@ -18,3 +18,15 @@ def test_paths_whose_stress_does_not_fall_are_counted(tmp_path, monkeypatch, ris
     monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
     remark = f"remark: {rising} of 2 paths end before their stress falls: load them further for a peak"
     assert collect.collect(tmp_path, pictures=False).count(remark) == (rising > 0)
+
+
+@pytest.mark.parametrize("rising", [0, 1])
+def test_onsets_and_peaks_are_drawn_over_fractions(tmp_path, rising):
+    """Peaks only if all paths have passed theirs."""
+    documents = [path_document(2, 0.0), path_document(2, 1.0)]
+    documents[1] |= {"path": documents[1]["path"][: 1 if rising else None]}
+    table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
+    assert [path.name for path in pictures.draw_over_fractions(tmp_path, table)] == ["peaks.png"]
+    labels = [axes.get_ylabel() for axes in pictures.figure_over_fractions(table).axes if axes.get_ylabel()]
+    names = [("onset", "11"), ("onset", "22"), ("peak", "11"), ("peak", "22")][: 2 if rising else 4]
+    assert labels == [f"{mark} $S_{{{component}}}$\n(GPa)" for mark, component in names]
