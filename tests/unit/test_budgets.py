@@ -29,14 +29,14 @@ LINES = {
     "materials": 1430 + 52 + 122,
     "mesh": 5500 + 45 + 278,
     "microstructure": 2140 + 1 + 80,
-    "report": 3420 + 207 + 109,
+    "report": 3420 + 209 + 109,
     "results": 2430 + 208 + 35,
     "schema": 430 + 7 + 5,
     "studies": 2950 + 108 + 2,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 150 + 75,
 }
-FILES, TOTAL = 310, 45000 + 692 + 1132
+FILES, TOTAL = 310, 45000 + 694 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

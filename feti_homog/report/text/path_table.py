@@ -62,8 +62,10 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     text = begins.get(largest, text)
     no_peak = "No stress acts on the path, and there is no peak"
     text = f"{text}: {_landmark(document, peak, '')}" if "event" in peak else no_peak
+    within = "in the step to " if noun == "increment" else ""
     for title in ("first_softening_", "first_break_"):
-        text += f"; {title.replace('_', ' ')}{_landmark(document, peak, title)}" if f"{title}event" in peak else ""
+        if f"{title}event" in peak:
+            text += f"; {title.replace('_', ' ')}{within}{_landmark(document, peak, title)}"
     stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]

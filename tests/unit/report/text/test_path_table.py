@@ -63,6 +63,7 @@ def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, 
     words = " ".join(" ".join(_peak_lines(document, peak)).split())
     assert words.startswith(begins) and words.endswith(ends)
     assert marks(document)[peak["event"]].removeprefix("first break and ") == mark
+    assert words.count("; first break in the step to") == broke  # the stress behind the breaks of an increment
 
 
 @pytest.mark.parametrize("status", [{"unfinished": "by a limit"}, {}])
