@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 from scipy.stats import chi2, norm
 
 from feti_homog.case import sections
@@ -144,6 +144,14 @@ def estimate(
     return replace(estimates, evaluations=minimum.nfev, converged=bool(minimum.success))
 
 
+def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:
+    """Call a sum of squares on the way of a simplex (Nelder and Mead) down from a start, both (n,), within bounds."""
+    size = _sizes(start)
+    box = np.transpose(bounds) / size[:, None]
+    options = {"maxfev": MOST_EVALUATIONS, "xatol": LEAST_CHANCE, "fatol": 1.0}
+    minimize(lambda z: squares(z * size), start / size, method="Nelder-Mead", bounds=box, options=options)
+
+
 def summarize(
     x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
@@ -183,7 +191,8 @@ def fit_document(
         place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(unknowns, estimates.x, strict=True))
         faults.append(f"the search stalled at {place}, where the values change in jumps or not at all: start elsewhere")
     elif misfits:
-        faults.append(f"the model does not describe the measurements (chance {estimates.chance:.2g}): intervals fail")
+        words = "the model does not describe the measurements, or other starts fit better"
+        faults.append(f"{words} (chance {estimates.chance:.2g}): intervals fail")
     else:
         faults += names_of(estimates.undetermined, [*unknowns])
     cure = f"; {steps} makes the curve a staircase: more teeth (softening_tolerance) make it smooth" if steps else ""

@@ -170,14 +170,21 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Return the estimates from the start; after a poor fit or CaseError, from the best of `STARTS`.  On rank 0."""
+        """Return the estimates from the start; after a poor fit or CaseError, also from other points.  On rank 0.
+
+        Further searches begin at the best of `STARTS` points and, where derivatives mislead at jumps of a curve, at the
+        end of a simplex from the start.
+        """
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
         start, low, high = np.array(rows).T
 
-        def squares(point: Point) -> float:
-            return float(np.square((self.computed[point] - y) / std).sum())
+        def squares(x: Float | Point) -> float:
+            if _rounded(x) not in self.computed:
+                with suppress(CaseError, ConvergenceError):
+                    self.values(np.array(x))
+            return float(np.square((self.computed.get(_rounded(x), np.inf) - y) / std).sum())
 
         def search(x: Float) -> estimation.ParameterEstimates:
             estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
@@ -193,10 +200,13 @@ class Evaluations:
             standard_streams.say("remark: a poor fit, or none, from this start; the next is the best further point:")
         box = [Axis(path, ends=(a, b), log=a > 0.0) for path, a, b in zip(self.fit.paths, low, high, strict=True)]
         for point in sampled_points(box, sections.SweepSection(samples=STARTS - 1)):
-            with suppress(CaseError, ConvergenceError):
-                self.values(np.array([*point.values()]))
+            squares(np.array([*point.values()]))
         # Without any sound point the search has the fault of the start again.
-        return search(np.array(min(self.computed, key=squares, default=start)))
+        estimates = search(np.array(min(self.computed, key=squares, default=start)))
+        if estimates.misfits:
+            estimation.descend(squares, start, (low, high))
+            estimates = search(np.array(min(self.computed, key=squares)))
+        return estimates
 
     def values(self, x: Float) -> Float:
         """Return the data (m,) at the unknowns x (n,); compute and store them at the first call for x.  On rank 0."""

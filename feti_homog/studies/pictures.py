@@ -195,7 +195,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
         panels[-1].locator_params(axis="x", nbins=6)
         plot_helpers.finish_curves(panels[-1])
     stress = results[0]["case"].get("output", {}).get("stress_unit", "") if results else ""
-    title = f"{document['name']}: computed and measured"
+    title = f"{document['name']}: computed and measured{', not converged' if document.get('faults') else ''}"
     for name, number in document.get("unknowns", {}).items():
         deviation = f" ± {number['std']:.2g}" if number["std"] else ""
         title += f"\n{tables.with_unit(name, stress)} = {number['estimate']:.5g}{deviation}"

@@ -65,7 +65,7 @@ def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, 
     estimates = summarize(np.array([200.0]), y + 1.5 * residual * np.array([0.0, 1.0]), (y, std), J, bounds)
     found = estimation.fit_document(fit.unknowns, fit.data, estimates)
     stalls = slope == 0.0  # and two degrees of freedom: exp(-x / 2) = 1e-3 at 3.72^2
-    words = "stalled at material.fibre.young = 200, " if stalls else "does not describe the measurements (chance"
+    words = "stalled at material.fibre.young = 200, " if stalls else "or other starts fit better (chance"
     expected = [words] if is_fault else ["no measured value depends"] * stalls
     assert len(found["faults"]) == len(expected) and all(w in f for w, f in zip(expected, found["faults"], strict=True))
     assert ("interval?" in study_tables.fit_text(found)) == (is_fault and not stalls)

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from scipy.stats import chi2
 
 from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.studies import fit_file
+from feti_homog.studies import estimation, fit_file
 from feti_homog.studies.fit import Evaluations
 
 STRAINS = np.linspace(0.001, 0.02, 15)
@@ -77,6 +77,23 @@ def test_false_minima_with_possible_residuals_are_left(tmp_path, monkeypatch, ch
     std = 0.3 * np.sqrt(false.residuals @ false.residuals / chi2.isf(chance, len(STRAINS) - false.rank))
     found = evaluations(tmp_path, monkeypatch, start, std).estimate()
     assert found is not None and found.chance is not None and found.chance > 0.5 > 10 * chance
+
+
+@pytest.mark.parametrize("start", [(40.0, 0.25), (20.0, 0.1), (50.0, 0.15)])
+def test_a_simplex_passes_a_staircase(tmp_path, monkeypatch, start):
+    """Derivatives mislead a search: between the jumps of the curve, the strength acts in the other direction."""
+    smooth, step = bar, 2.0
+
+    def staircase(x: Any) -> Any:
+        level = step * round(x[0] / step)
+        return smooth((level - 0.3 * (x[0] - level), x[1]))
+
+    monkeypatch.setitem(globals(), "bar", staircase)
+    found = []
+    for descend in (estimation.descend, lambda *_: None):
+        monkeypatch.setattr(estimation, "descend", descend)
+        found.append(evaluations(tmp_path, monkeypatch, start).estimate())
+    assert found[0].x == pytest.approx(TRUTH, rel=1e-3) and not found[0].misfits and found[1].misfits
 
 
 def test_a_good_start_needs_no_others(tmp_path, monkeypatch):
