@@ -146,8 +146,8 @@ class Homogenization:
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
         means = distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area
-        stress, star, (energy,) = np.split(means, [len(loads), -1])
-        sides, stress = stress[len(strain) :], solver.closure.T @ stress
+        all_stresses, fluctuation, (energy,) = np.split(means, [len(loads), -1])
+        sides, stress = all_stresses[len(strain) :], solver.closure.T @ all_stresses
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (coupled_interfaces.slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
@@ -158,9 +158,9 @@ class Homogenization:
         largest = (self._largest(u) + scales.imposed(acting)) or 1.0
         imposed = float(scales.imposed_strain(acting).max()) or 1.0
         reuss = scales.stress_scale(acting) * imposed
-        left = np.abs(sides if sides.size else star - opening / self.cell.summary.area).max()
+        unbalanced = sides if sides.size else fluctuation - opening / self.cell.summary.area
         checks = {
-            "strain": float(left / imposed) + (0.0 if sides.size else self._strain_inside),
+            "strain": float(np.abs(unbalanced).max() / imposed) + (0.0 if sides.size else self._strain_inside),
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
         }
         if solver.jump_operator.global_rows:

@@ -64,8 +64,8 @@ def with_displacements(cell: TornCell, responses: Sequence[Response]) -> list[Re
     """Return the responses with u* inside the subdomains.  Collective."""
     if all(len(response.inside) == cell.offsets[-1] for response in responses):
         return list(responses)
-    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
-    columns = cell.extended(u, loads).T
+    u = np.stack([response.u for response in responses], axis=1)
+    columns = cell.extended(u, np.stack([response.all_loads for response in responses], axis=1)).T
     return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
 
 
@@ -74,6 +74,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
 
     `states` has the responses of each problem in each state; a problem without a response has zero fields.
     """
+    # Conduction has its responses in the place of the axial problem.
     by_problem = [*zip((cell, cell.axial or cell), zip(*states, strict=True), strict=False)]
     u = [np.zeros((torn.offsets[-1], len(states))) for torn, _ in by_problem]
     passes = [_stresses(*pair, out) for pair, out in zip(by_problem, u, strict=True) if any(pair[1])]
@@ -87,7 +88,8 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
         stress, without_noise = sum(stresses for *_, stresses in chunks)
         weights = chunk.weights / chunk.weights.sum(axis=1, keepdims=True)
         last = first + len(weights)
-        means[:, components, first:last], first = (stress[:, components] * weights).sum(axis=-1), last
+        means[:, components, first:last] = (stress[:, components] * weights).sum(axis=-1)
+        first = last
         if not is_scalar and not np.isnan(without_noise).any():
             places = in_cell(chunk.points.reshape(-1, 2), cell.summary.shift)[:, None]
             for largest, tensors in zip(by_phase, without_noise.reshape(*stress.shape[:2], -1), strict=True):
