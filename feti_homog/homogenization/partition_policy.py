@@ -183,8 +183,8 @@ def memory(
         columns: multipliers that have influence columns.
     """
     dofs = sum(components) * max(nodes)
-    of_interiors, of_cells = keeps_interiors(case) * dofs * INTERIOR_BYTES, max(components) * max(nodes) * FACTOR_BYTES
-    factors = of_cells if max(subdomains) == 1 else of_interiors
+    of_interiors = dofs * INTERIOR_BYTES if keeps_interiors(case) else 0.0
+    factors = max(components) * max(nodes) * FACTOR_BYTES if max(subdomains) == 1 else of_interiors
     return BASE_BYTES + dofs * DOF_BYTES + factors + columns / len(nodes) * COLUMN_BYTES
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import Case
+from feti_homog.case import Case, cell_sizes
 from feti_homog.fem import AXIAL, Problem
 from feti_homog.feti import DualSolution, FetiSolver, thresholds
 from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, shared_entities
@@ -243,7 +243,8 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
-        summary = (part := cut(case, lattice, comm, policy)).summary
+        part = cut(case, lattice, comm, policy)
+        summary = part.summary
         shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
         pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {pieces}")
@@ -253,7 +254,8 @@ def assemble_subdomains(
         for s in map(refinement.halved, part.submeshes.cut()):
             phase_of = summary.constituent_phase[s.constituent]
             material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
-            mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
+            materials = [case.material_of(name) for name in _phases(summary, s)]
+            mixed = tuple(cell_sizes.is_mixed(case.cell.order, m, case.analysis.plane) for m in materials)
             flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
             laws = _laws(case, summary, s, problem)
             subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
