@@ -188,7 +188,8 @@ def _entry(
         entry["friction_heat"] = energies.friction
     if law.has_toughness:
         entry["fracture_energy"] = energies.fracture
-        entry |= {"dissipation_ratio": energies.released / energies.fracture} if energies.fracture else {}
+        if energies.fracture:
+            entry["dissipation_ratio"] = energies.released / energies.fracture
     return entry | context.loaded_point(responses)
 
 

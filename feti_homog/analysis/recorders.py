@@ -49,8 +49,9 @@ class CheckRecorder:
         A solve without convergence and a failed check are faults.
         """
         state, error = response.state, response.checks.get("jump")
+        reason = state.solution.reason
         self.iterations.append(state.iterations)
-        self.reasons.append(state.solution.reason)
+        self.reasons.append(reason)
         without = "by the factor of the cell" if "hill" in response.checks else "by influence columns"
         jump = without if error is None else f"relative jump {error:.1e}"
         line = f"{state.iterations or 'no'} iterations, {jump}"
@@ -58,13 +59,11 @@ class CheckRecorder:
             line += f", {response.debonded} debonded ({response.counts['closed']} closed), solves: {state.solves}"
         if state.free_motions:
             line += f", {state.free_motions} free motions"
-        if state.solution.reason < 0:
-            is_limit = state.solution.reason == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
+        if reason < 0:
+            is_limit = reason == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
             cure = CURE if is_limit and not any(CURE in fault for fault in self.faults) else ""
-            self.faults.append(
-                f"{name}: no convergence after {state.iterations} iterations, {jump} "
-                f"(KSPConvergedReason {state.solution.reason}); result marked{cure}"
-            )
+            fault = f"no convergence after {state.iterations} iterations, {jump} (KSPConvergedReason {reason})"
+            self.faults.append(f"{name}: {fault}; result marked{cure}")
         self.require(name, response.checks)
         return f"  {name}: {line}"
 

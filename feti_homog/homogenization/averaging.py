@@ -86,7 +86,7 @@ class Response:
 
 
 class Homogenization:
-    """Averages over a torn cell with interfaces.
+    """Averages over a torn `cell` with interfaces.
 
     Attributes:
         law: bond law, without the energies released at tips; None without [interface].

@@ -166,7 +166,7 @@ class TipZones:
     def energy_changes(
         self, tips: debonded_arcs.CrackTips, reach: Float, responses: Sequence[Response], grows: bool = False
     ) -> Float:
-        """Differentiate twice the energies (t, k, k) by the turn or the growth of the mesh at each tip.  Collective.
+        """Return derivatives (t, k, k) of twice the energies by the turn or growth of each tip's mesh.  Collective.
 
         If the mesh `grows`, distances from the tip grow, along the circle and across it.  Nodes beyond `reach` rest.
         """

@@ -83,7 +83,7 @@ def energy_errors(
     nested: bool | None = None,
     zones: TipZones | None = None,
 ) -> EnergyErrors:
-    """Estimate the mesh errors of k responses in one problem.  Collective.
+    """Estimate the mesh errors of k responses in one problem, with the same intact bonds.  Collective.
 
     Args:
         contact: whether faces touch.

@@ -58,16 +58,16 @@ def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tupl
     problem = problems(case)[0]
     if problem in (PLANE, CONDUCTION):
         return (dC,)
-    axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
+    axial, in_plane = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
     material = case.material_of(phase)
     alpha = laws.expansion(material)
     if problem != GENERALIZED or alpha is None:
-        return dC, axial
+        return in_plane, axial
     C = laws.spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
     N, dN = np.column_stack([np.eye(4), -alpha[IN_PLANE]]), np.zeros((4, 5))
     dN[:, 4] = -expansion[IN_PLANE]
     mixed = N.T @ C @ dN
-    return N.T @ dC @ N + mixed + mixed.T, axial
+    return N.T @ in_plane @ N + mixed + mixed.T, axial
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:

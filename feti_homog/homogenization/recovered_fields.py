@@ -120,8 +120,8 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
     masks = [s.state.status == Contact.BONDED for s in states if rigid.any() and s is not None and s.debonded]
     if masks:
         length, inner = FibreInterfaces(cell).length, cell.summary.is_fibre[nodes.fibre]
-        sides = [rigid[nodes.pair] & on for on in (inner, ~inner)]  # a coated fibre may have two interfaces
-        if any(np.minimum(length(bonded & on), length(~bonded & on)).any() for bonded in masks for on in sides):
+        sides = [rigid[nodes.pair] & side for side in (inner, ~inner)]  # a coated fibre may have two interfaces
+        if any(np.minimum(length(bonded & side), length(~bonded & side)).any() for bonded in masks for side in sides):
             places.add("tips of debonding")
     return places
 

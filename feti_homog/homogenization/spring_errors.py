@@ -42,8 +42,8 @@ class SpringSides:
         sides = [(np.zeros((0, lattice.order + 1), np.int64), np.zeros((0, len(POINTS), 2)), np.zeros(0))]
         for part in parts:
             triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
-            after = first + part.mesh.n_classes
-            nodes, first = number[first:after][line], after
+            nodes = number[first : first + part.mesh.n_classes][line]
+            first += part.mesh.n_classes
             inner = (fibre[nodes] == part.submesh.constituent[triangle, None]).all(axis=1)
             inner[inner] = (neighbours.near[nodes[inner, 0]] == nodes[inner, 1, None]).any(axis=1)  # not along a cut
             normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])

@@ -105,16 +105,16 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     growth = np.zeros((k, k))
-    for s, displacement in cell.by_part(inside):
-        u = displacement.reshape(-1, problem.components, k)
-        V = None if _growing_fraction(cell.case) is None else _velocity(s.mesh.points, cell.summary)
-        for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
-            nodes = s.mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
-            of_nodes = s.mesh.points[nodes], u[s.mesh.node_class[nodes]]
-            fields = shape_functions.ElementFields.of(problem, *of_nodes, s.L, loads[:m], s.is_mixed)
-            sums[material_sections.provider(s.submesh.phase, cell.case.materials)] += _products(fields)
+    for part, displacement in cell.by_part(inside):
+        mesh, u = part.mesh, displacement.reshape(-1, problem.components, k)
+        V = None if _growing_fraction(cell.case) is None else _velocity(mesh.points, cell.summary)
+        for first in range(0, len(mesh.triangles), assembly.ELEMENTS_AT_ONCE):
+            nodes = mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
+            of_nodes = mesh.points[nodes], u[mesh.node_class[nodes]]
+            fields = shape_functions.ElementFields.of(problem, *of_nodes, part.L, loads[:m], part.is_mixed)
+            sums[material_sections.provider(part.submesh.phase, cell.case.materials)] += _products(fields)
             if V is not None:
-                growth += fields.change(s.L, loads[m:], V[nodes])
+                growth += fields.change(part.L, loads[m:], V[nodes])
     grams = {
         name: (T.T @ distributed_arrays.allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k)
         for name, gram in sums.items()

@@ -93,7 +93,7 @@ class TornCell:
         return inside
 
     def by_part(self, u: Float) -> Iterator[tuple[UniformPart, Float]]:
-        """Return each part with its rows of displacements u (dofs, ...)."""
+        """Iterate over the parts, each with a view of its rows in displacements u (dofs, ...)."""
         return zip(self.parts, np.split(u, self.offsets[1:-1]), strict=False)
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
