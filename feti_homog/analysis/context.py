@@ -228,7 +228,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Build result.json entries: debonding under gamma12 or the only load, and all iterations.  Collective."""
+        """Build result.json entries: debonding under gamma12 or the only load, and summed iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

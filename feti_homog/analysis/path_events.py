@@ -268,7 +268,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
     """Count this rank's bonds that part.  Returns -1 for wrong arrays, impossible numbers, or bonds that heal."""
     has_all = "lam" in event
-    expected = {name: of for name, of in layout.items() if has_all or not checkpoints.FOUND_AGAIN.fullmatch(name)}
+    expected = {name: kind for name, kind in layout.items() if has_all or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != expected:
         return -1
     suffixes = (*SUFFIXES[: len(context.loads.problems)], "_after")

@@ -123,7 +123,7 @@ def _run_and_write(
         # No function in the context may refer to the context: garbage collection on one rank would then close the
         # parallel file, which is a collective call.
         context = replace(context, directory=directory, resume=resume, log=log.write, events=result_json.LOG)
-        context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
+        context.opening = lambda itself: result_json.text_of(records.plain(_opening(itself)))
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:

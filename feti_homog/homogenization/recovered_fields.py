@@ -134,14 +134,14 @@ def _stresses(
     Writes u* to `out` (dofs, s).  The stresses at the q points come as computed, then with 0 in place of rounding
     errors; they are 0 in states without a response.
     """
-    at = [number for number, response in enumerate(responses) if response is not None]
+    columns = [number for number, response in enumerate(responses) if response is not None]
     present = with_displacements(cell, [response for response in responses if response is not None])
-    out[:, at] = np.stack([response.inside for response in present], axis=1)
+    out[:, columns] = np.stack([response.inside for response in present], axis=1)
     loads = np.stack([response.all_loads for response in present], axis=1)[: len(cell.solver.problem.loads)]
-    for part, displacement in cell.by_part(out[:, at]):
+    for part, displacement in cell.by_part(out[:, columns]):
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from the stresses conjugate to strains of displacements.
-        rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))
+        rows, constants = np.zeros((6, m)), np.zeros((6, len(columns)))
         rows[voigt.IN_PLANE if problem.turns else phase_laws.AXIAL_SHEAR] = np.eye(m)
         if len(loads) > m:  # S33 is conjugate to the load E33
             rows[2] = np.linalg.solve(L[:m, :m], L[:m, m])
@@ -149,12 +149,12 @@ def _stresses(
         elif problem.turns:
             rows[2] = laws.out_of_plane(cell.case.material_of(part.submesh.phase), cell.case.analysis.plane)[0]
         noise = ROUNDING * (np.abs(L) @ np.abs(loads))[: problem.stresses].max(axis=0)[:, None, None]
-        u_of_part = displacement.reshape(-1, problem.components, len(at))
+        u_of_part = displacement.reshape(-1, problem.components, len(columns))
         recovery = stress_recovery.RecoveredStress.on(part.mesh, L, problem, u_of_part, loads, part.is_mixed)
         for chunk in recovery.elements:
-            stress = rows @ chunk.stress.reshape(-1, m, len(at)).transpose(2, 1, 0) + constants.T[:, :, None]
+            stress = rows @ chunk.stress.reshape(-1, m, len(columns)).transpose(2, 1, 0) + constants.T[:, :, None]
             everywhere = np.zeros((2, len(responses), *stress.shape[1:]))  # also in states without a response
-            everywhere[:, at] = stress, np.where(np.abs(stress) < noise, 0.0, stress)
+            everywhere[:, columns] = stress, np.where(np.abs(stress) < noise, 0.0, stress)
             yield part.submesh.phase, chunk, everywhere.reshape(*everywhere.shape[:3], *chunk.weights.shape)
 
 

@@ -134,10 +134,10 @@ def tear_by_tiles(
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
-    own = filled_tiles(() if noded is None else noded.parts, comm)
-    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in own])))
+    of_rank = filled_tiles(() if noded is None else noded.parts, comm)
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in of_rank])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
-    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for k, tile, filling in own]
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for k, tile, filling in of_rank]
     torus, tile = mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
