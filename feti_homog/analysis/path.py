@@ -62,7 +62,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
                 counts += f", {context.cell.comm.allreduce(int(((damage > 0.0) & (damage < 1.0)).sum()))} damaged"
             is_known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), counts, is_known)
-            top = place if point.load_factor == work.largest_load else top
+            if point.load_factor == work.largest_load:
+                top = place
             if may_fall and point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load:
                 way = "the path ends at load factor 1, perhaps much later; with a prescribed strain it ends earlier"
                 context.progress.say(f"  the load falls from its largest value so far, {top}; {way}")
@@ -71,10 +72,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
-                context.checks.faults.append(
-                    f"[path] max_events = {path.max_events}: the path was not finished: result.json has status "
-                    f'"not converged"; --resume with a higher max_events goes on{context.case.fewer_events}'
-                )
+                end = 'the path was not finished: result.json has status "not converged"'
+                cure = f"--resume with a higher max_events goes on{context.case.fewer_events}"
+                context.checks.faults.append(f"[path] max_events = {path.max_events}: {end}; {cure}")
                 break
     if last is None:
         return {"resumed": count, "path": ()}
@@ -227,12 +227,12 @@ def _completed(
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
-        names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
+        more = ", ..." if len(loose) > NAMED_FIBRES else ""
+        names = f"{', '.join(map(str, loose[:NAMED_FIBRES]))}{more}"
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
-        context.notes.append(
-            f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
-            "and the path follows one of them, which depends on the order of nodes"
-        )
+        several = "with friction such a fibre may have several equilibria under one load"
+        choice = "the path follows one of them, which depends on the order of nodes"
+        context.notes.append(f"[path] no bond of {fibres} holds: {several}, and {choice}")
     if context.case.has_friction and not any(entry["open"] or entry["closed"] for entry in entries):
         context.notes.append("[interface] friction: without effect, for no face is debonded and no bond breaks")
     for number, mark in marks.items():

@@ -85,10 +85,8 @@ class CheckRecorder:
         """Return a warning line if the solver tolerance is looser than the checks, else []."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
-        return [
-            f"-feti_ksp_rtol {self.rtol:g} asks for less than the checks do: the result is marked unless their errors "
-            f"are at most {MAX_CHECK_ERROR:g}"
-        ]
+        end = f"the result is marked unless their errors are at most {MAX_CHECK_ERROR:g}"
+        return [f"-feti_ksp_rtol {self.rtol:g} asks for less than the checks do: {end}"]
 
 
 class StateRecorder:

@@ -159,7 +159,9 @@ def _run_and_write(
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
     """Write result.json and the other result files; remove files of earlier results.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME} | ({result_json.LOG} if cell.case.section.is_followed else set())
+    written = {result_json.NAME}
+    if cell.case.section.is_followed:
+        written.add(result_json.LOG)
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
     name = cell.case.analysis.type

@@ -41,7 +41,8 @@ def shown(
         if known:
             known_time, known_share, known_count = now, reached, count
         seconds, gain, steps = now - known_time, reached - known_share, count - known_count
-        text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
+        if steps and seconds:
+            text += f", {60.0 * steps / seconds:,.1f} a minute"
         if share < reached:  # after a peak the load may fall for good
             text = f"falls to {share:.0%}, {text}"
         elif gain:  # first, since a narrow terminal shows the beginning

@@ -50,8 +50,10 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
     """
     path = directory / checkpoints.FOLDER / checkpoints.NAME
     if path.parent.is_dir():
+        content = b""
         try:
-            content = next(checkpoints.records(path), (0, b""))[1] if path.is_file() else b""
+            if path.is_file():
+                _, content = next(checkpoints.records(path), (0, b""))
         except CaseError as error:
             raise CaseError(f"--resume: {error}") from error
         signature, _, opening = content.decode().partition("\n")

@@ -129,15 +129,14 @@ class Homogenization:
         Raises ConvergenceError if the residual of the state is not finite, because the Krylov method broke down.
         """
         if not np.isfinite(state.solution.residual):
-            raise ConvergenceError(
-                f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
-                f"iterations (KSPConvergedReason {state.solution.reason})"
-            )
+            end = f"after {state.iterations} iterations (KSPConvergedReason {state.solution.reason})"
+            raise ConvergenceError(f"strain {state.solution.strain.tolist()}: the Krylov method broke down {end}")
         if brief and state.solution.alpha is None:
             strain, stress = state.solution.strain, self.interface.stress(state.solution)
             energy = float(stress @ strain) - self._rubbing(state)
             return self._scaled(state, scale, stress, energy, np.zeros(0), {})
-        cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
+        cell, solver = self.cell, self.cell.solver
+        state = self.interface.completed(state)
         loads, u = state.solution.strain, solver.boundary_displacement(state.solution)
         strain = loads[: len(self.loads)]
         # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
@@ -154,7 +153,8 @@ class Homogenization:
         opening = distributed_arrays.allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
-        acting, scales = self.interface.scales.acting(strain, state.asked), self.interface.scales
+        scales = self.interface.scales
+        acting = scales.acting(strain, state.asked)
         largest = (self._largest(u) + scales.imposed(acting)) or 1.0
         imposed = float(scales.imposed_strain(acting).max()) or 1.0
         reuss = scales.stress_scale(acting) * imposed

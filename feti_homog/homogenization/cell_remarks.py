@@ -85,10 +85,8 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     pinned = np.searchsorted(torus.class_keys, submeshes.pinned_classes(torus))
     if len(pinned) == 1 and not torus.never_part[pinned[0]] and torus.meeting[pinned[0]] >= 2:
         x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned[0])[0]] + torus.mesh.origin
-        lines.append(
-            f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
-            "on interfaces; use a finer mesh"
-        )
+        why = "it holds the cell, for all nodes of the mesh are on interfaces"
+        lines.append(f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: {why}; use a finer mesh")
     return tuple(lines)
 
 
@@ -251,16 +249,13 @@ def _law_warnings(case: Case) -> list[str]:
         )
         similar = strength**2 / toughness
         if abs(stiffness / similar - 1.0) > SAME_RATIO:
-            lines.append(
-                f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
-                f"changes depends on the path; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
-                "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
-            )
+            formula = "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
+            expected = f"expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness {formula}"
+            fault = "the energy of bonds whose mode changes depends on the path"
+            lines.append(f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: {fault}; {expected}")
     bond, most = case.interfaces[0], interface_section.InterfaceSection.softening_tolerance
     if law.overshoot > most * (1.0 + SAME_RATIO):
         cause = f"softening_tolerance = {bond.softening_tolerance:g}" if bond.teeth is None else f"teeth = {bond.teeth}"
-        lines.append(
-            f"[interface] {cause}: the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the "
-            f"peak of the cell; by default at most by {most:.1%}"
-        )
+        excess = f"the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the peak of the cell"
+        lines.append(f"[interface] {cause}: {excess}; by default at most by {most:.1%}")
     return lines

@@ -175,7 +175,8 @@ def nested_interiors(
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
-        first, meshes, numbers = members[0], [refinement.refine(s.submesh, coarser) for s in members], list[Int]()
+        meshes = [refinement.refine(s.submesh, coarser) for s in members]
+        first, numbers = members[0], list[Int]()
         for k, s, mesh in zip(group, members, meshes, strict=True):
             of_fine = np.full(s.n_dofs, inside)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))

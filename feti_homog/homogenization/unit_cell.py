@@ -204,7 +204,8 @@ def tear(
     Raises on every rank, like `tile_tearing.cut` and `solver_plan.build`; `progress` reports the stages.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
+    summary, table = part.summary, part.table
+    recovers = case.output.mesh_error or case.output.fields
     del part  # the submesh of the rank takes as much memory as the submeshes of its subdomains
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
