@@ -203,7 +203,6 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
     if math.isinf(length):
         return lines
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
-
     ratio = length / radii.mean() if len(radii) else 1.0
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
     zone = f"E' G / N^2 = {length:.3g} long"

@@ -84,8 +84,9 @@ class TornCell:
 
     def extended(self, u: Float, loads: Float) -> Float:
         """Extend boundary displacements u (boundary dofs, k) to u* (dofs, k) in all parts, under loads (v, k)."""
-        inside, place, of_place = np.empty((self.offsets[-1], u.shape[1]), order="F"), -1, np.zeros(0)
+        inside = np.empty((self.offsets[-1], u.shape[1]), order="F")
         keep = partition_policy.keeps_interiors(self.case)
+        place, of_place = -1, np.zeros(0)
         for part, of_part in self.by_part(inside):
             if part.place != place:
                 place, of_place = part.place, self.solver.extended(part.place, u, loads, keep)
