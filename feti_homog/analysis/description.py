@@ -87,8 +87,9 @@ def _cost_lines(
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""
-    few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
-    yield f"estimate   on {ranks} {noun} at most about {few} per rank{all_bonds}, without pictures"
+    noun = "rank" if ranks == 1 else "ranks"
+    size = partition_policy.in_words(memory)
+    yield f"estimate   on {ranks} {noun} at most about {size} per rank{all_bonds}, without pictures"
     most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one rank per body")
     useful = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
     yield f"ranks      recommended: {useful} ({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})"

@@ -53,10 +53,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)
     if not context.plane.interface.is_linear(bonds.status):
-        raise CaseError(
-            '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
-            'superposes loads, which contact forbids: type = "path" finds the onset of one load'
-        )
+        reason = '[analysis] type = "envelope" superposes loads, which contact forbids'
+        cure = 'type = "path" finds the onset of one load'
+        raise CaseError(f"[interface] contact: expected false with a debonded curve of the mesh; {reason}: {cure}")
     columns, errors, responses = context.unit_states(bonds, context.loads.zero_multipliers())
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})
