@@ -169,7 +169,7 @@ def parts(document: dict[str, Any], **mesh: Any) -> Float:
     case = Case.parse(document | {"cell": document["cell"] | mesh})
     cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
     context, size = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True)), dict[str, float]()
-    responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)[1]
+    _, _, responses = context.unit_states(context.bonds(None), context.loads.zero_multipliers())
     for problem, own in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
         errors = energy_errors(problem.cell, own)
         of_loads = np.abs(np.diag(errors.elements)) + np.abs(np.diag(errors.arcs))
@@ -206,7 +206,7 @@ def both_errors(case: Case, exact: Float | None = None) -> Iterator[tuple[str, F
     """
     cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
     context = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True))
-    columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
+    columns, _, responses = context.unit_states(context.bonds(None), context.loads.zero_multipliers())
     for own in (each.cell for each in context.loads.problems):
         k = len(own.solver.problem.loads)
         under_unit_loads, responses = responses[:k], responses[k:]

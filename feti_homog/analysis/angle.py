@@ -20,13 +20,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)
-    unit = section.strain is None
-    starts = context.loads.zero_multipliers()[: None if unit else 1]
+    by_unit_loads = section.strain is None
+    loads = context.loads.names if by_unit_loads else ("strain",)
+    starts = context.loads.zero_multipliers()[: len(loads)]
     points = []
     for number, value in enumerate(section.values):
         bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
-        if unit:
+        if by_unit_loads:
             columns, errors, responses = context.unit_states(bonds, starts, label=f"{label} ", point=number)
             point |= columns | energy_error(columns["stiffness"], errors)
             if not (context.plane.interface.contact and responses[0].debonded):
@@ -39,7 +40,6 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
             context.states.record({label: responses}, 1.0, number)
         starts = [r.state.solution.lam for r in responses]
-        loads = context.loads.names if unit else ("strain",)
         point["tips"] = tip_rates(context, {load: [r] for load, r in zip(loads, responses, strict=True)})
         points.append(AnglePoint(**point | context.point(responses)))
     note_accuracy(context, max(point.mesh_error or 0.0 for point in points))

@@ -131,16 +131,16 @@ class SolverInfo:
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
         """Return the record of all solvers, with the `iterations` and KSP `reasons` of each state.  Collective."""
-        plan, solvers = cell.summary, [problem.solver for problem in cell.problems]
-        cut = "pieces across the materials, for nothing can part" if plan.across else "bodies and pieces of bodies"
+        summary, solvers = cell.summary, [problem.solver for problem in cell.problems]
+        cut = "pieces across the materials, for nothing can part" if summary.across else "bodies and pieces of bodies"
         uncut = "one subdomain, for nothing can part: one factor of the whole cell"
         return cls(
             ranks=cell.comm.size,
-            bodies=plan.bodies,
-            subdomains=plan.subdomains,
+            bodies=summary.bodies,
+            subdomains=summary.subdomains,
             dofs=cell.comm.allreduce(sum(s.n_dofs for solver in solvers for s in solver.subdomains)),
             multipliers=sum(s.jump_operator.global_rows for s in solvers),
-            interface_nodes=plan.interface_nodes or cell.comm.allreduce(len(cell.solver.jump_operator.nodes.row)),
+            interface_nodes=summary.interface_nodes or cell.comm.allreduce(len(cell.solver.jump_operator.nodes.row)),
             kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
             coarse_dim=sum(s.coarse_dimension for s in solvers),
             factorizations=cell.comm.allreduce(sum(len(s.interface_operators.operators) for s in solvers)),

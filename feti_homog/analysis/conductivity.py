@@ -49,15 +49,16 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
     if cell.summary.voids or cell.comm.allreduce(int(cell.debonded(None).sum())) or not alike:
         return None
-    shares, matrix = cell.fractions(), cell.summary.phases[0]
-    c, across = np.array([shares[phase] for phase in tensors]), np.array([k[0, 0] for k in tensors.values()])
+    fractions, matrix = cell.fractions(), cell.summary.phases[0]
+    c, across = np.array([fractions[phase] for phase in tensors]), np.array([k[0, 0] for k in tensors.values()])
     wiener = hashin_shtrikman = maxwell = None
     if not phase_laws.has_springs(cell.case):
         wiener = float(1 / (c @ (1 / across))), float(c @ across)
         lower, upper = (phase_bounds.dispersed(c, across, float(k)) for k in (across.min(), across.max()))
         hashin_shtrikman = lower, upper
     if (radii := fibre_radii(cell)) is not None:
-        ((h,), *_) = (*phase_laws.springs(cell.case, cell.solver.problem).stiffness, (np.inf,))
+        conductances = phase_laws.springs(cell.case, cell.solver.problem).stiffness
+        h = conductances[0][0] if conductances else np.inf  # `fibre_radii` requires equal bonds
         acting = [across[0], *(1 / (1 / k[0, 0] + 1 / (h * radii[p])) for p, k in tensors.items() if p != matrix)]
         maxwell = phase_bounds.dispersed(c, acting, float(across[0]))
     axial = float(c @ [k[2, 2] for k in tensors.values()])

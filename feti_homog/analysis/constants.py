@@ -42,7 +42,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
         return entries
     if is_spatial:
         is_debonded = cell.comm.allreduce(int(cell.debonded(None).sum())) > 0
-        return entries | ({} if is_debonded or len(fractions) == 1 else _comparisons(cell, fractions))
+        return entries if is_debonded or len(fractions) == 1 else entries | _comparisons(cell, fractions)
     phases = [laws.plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
     shares, isotropic = list(fractions.values()), all(map(phase_bounds.is_isotropic, phases))
     hashin_shtrikman = phase_bounds.hashin_shtrikman(shares, phases) if isotropic else None
@@ -108,8 +108,10 @@ def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
     is_plain = phase_names.COATING not in summary.phases and all(bond.between is None for bond in case.interfaces)
     is_round = not any(np.isnan(radius).any() for radius in radii.values())  # the radii of other fibres are NaN
     # Circles are fitted to the nodes of users' meshes: equal radii differ by rounding.
-    is_like = not has_springs or all(np.allclose(radius, radius[0], atol=0.0) for radius in radii.values())
-    return {phase: float(radius[0]) for phase, radius in radii.items()} if is_plain and is_round and is_like else None
+    is_alike = not has_springs or all(np.allclose(radius, radius[0], atol=0.0) for radius in radii.values())
+    if not (is_plain and is_round and is_alike):
+        return None
+    return {phase: float(radius[0]) for phase, radius in radii.items()}
 
 
 def mesh_error(
@@ -130,10 +132,10 @@ def mesh_error(
     if not of_plus:
         return {}
     parts = {name: _secants(of_plus, name) for name in PARTS}
-    entries = parts["absolute"]
-    entries |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
+    of_compression = {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
+    entries = parts["absolute"] | of_compression
     stiffness, heat = secants["effective_stiffness"], secants.get("thermal_stress")
-    constants, energy = dict[str, float](), _energy(stiffness, parts)
+    energy, of_constants = _energy(stiffness, parts), dict[str, float]()
     if "moduli" in secants or "constants" in secants:
         values, errors = _constants(stiffness, heat), dict[str, Any]()
         for changes in (parts["signed"], parts["least"]):
@@ -141,22 +143,25 @@ def mesh_error(
             changed = _constants(stiffness - changes["effective_stiffness"], changed_heat)
             errors = {name: np.maximum(errors.get(name, 0.0), np.abs(changed[name] - values[name])) for name in values}
         _note_bounds(context, secants, values, errors, energy)
-        entries |= {name: errors.pop(name) for name in ("thermal_expansion",) if name in errors}
-        constants = {name: float(value) for name, value in errors.items()}
+        if "thermal_expansion" in errors:
+            entries["thermal_expansion"] = errors.pop("thermal_expansion")
+        of_constants = {name: float(value) for name, value in errors.items()}
     note_accuracy(context, energy)
-    return {"mesh_error": MeshErrors(**entries, energy=energy, constants=constants)}
+    return {"mesh_error": MeshErrors(**entries, energy=energy, constants=of_constants)}
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
     """Note which mesh suffices if `energy`, the relative energy error on rank 0, exceeds `accuracy`.  Collective."""
     cell = context.case.cell
-    if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
+    if cell.accuracy is None:
+        return
+    energy = context.cell.comm.bcast(energy)
+    if energy <= cell.accuracy:
         return
     finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
     line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
-    context.notes.append(
-        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} would be fine enough"
-    )
+    mesh = f"mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order}"
+    context.notes.append(f"{line}; {mesh} would be fine enough")
 
 
 def _note_bounds(
@@ -173,8 +178,10 @@ def _note_bounds(
         C = secants["effective_stiffness"]
         is_square = max(abs(C[0, 0] - C[1, 1]), *np.abs(C[:2, 2])) <= errors["bulk"]
         is_isotropic = values["anisotropy"] <= errors["anisotropy"]
-        limits |= {"bulk": plane.hashin_shtrikman.bulk} if is_square else {}
-        limits |= {"shear": plane.hashin_shtrikman.shear} if is_isotropic else {}
+        if is_square:
+            limits["bulk"] = plane.hashin_shtrikman.bulk
+        if is_isotropic:
+            limits["shear"] = plane.hashin_shtrikman.shear
     if secants.get("fibre_bounds") is not None and values["deviation"] <= errors["deviation"]:
         limits |= {name: pair for name, pair in records.plain(secants["fibre_bounds"]).items() if pair is not None}
     note_outside(context, limits, values, errors, energy)
@@ -252,9 +259,9 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     """Return the constants of a stiffness by name; for (6, 6) also nu31, nu32 and, with heat, expansions."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
-    named: dict[str, Any] = {}
-    for key, record in entries.items():
-        named |= {key: record} if key == "thermal_expansion" else records.plain(record)
+    named: dict[str, Any] = {"thermal_expansion": entries.pop("thermal_expansion", None)}
+    for record in entries.values():
+        named |= records.plain(record)
     if compliance is not None:  # nu12 and nu13 in ply axes
         named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
     return {name: np.asarray(value) for name, value in named.items() if value is not None}

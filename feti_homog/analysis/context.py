@@ -152,19 +152,7 @@ class AnalysisContext:
 
     def bonds(self, opening: float | None) -> BondState:
         """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
-        return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
-
-    def unit_responses(
-        self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
-    ) -> tuple[dict[str, Float], list[averaging.Response]]:
-        """Return `CellLoads.secants` and the responses to `sign` times the unit loads, from `starts`.  Collective."""
-        responses = list[averaging.Response]()
-        for problem in self.loads.problems:
-            first, count = len(responses), len(problem.loads)
-            responses += problem.respond(sign * np.eye(count), bonds, starts[first : first + count])
-            for name, response in zip(problem.loads, responses[first:], strict=True):
-                self.progress.say(self.checks.record(f"{label}{'-' if sign < 0 else ''}{name}", response))
-        return self.loads.secants(responses, sign), responses
+        return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, BONDED).astype(np.int8))
 
     def response_errors(
         self, groups: Sequence[Sequence[averaging.Response]]
@@ -175,16 +163,16 @@ class AnalysisContext:
         """
         has_tips = any(response.debonded for group in groups for response in group)
         if self.states.is_recording or self.case.output.sensitivities or has_tips:
-            groups = [*map(recovered_fields.with_displacements, (p.cell for p in self.loads.problems), groups)]
+            groups = [*map(recovered_fields.with_displacements, self.cell.problems, groups)]
         if not self.case.output.mesh_error:
             return [], [*chain(*groups)]
         from feti_homog.homogenization import mesh_estimate  # imports the recovery of stresses
 
         errors, estimated = list[mesh_estimate.EnergyErrors](), list[averaging.Response]()
         zones = self.tip_zones if has_tips else [None] * len(groups)
-        for problem, group, of_problem in zip(self.loads.problems, groups, zones, strict=False):
+        for problem, group, tip_zones in zip(self.loads.problems, groups, zones, strict=False):
             touches = problem.interface.contact and any(response.debonded for response in group)
-            errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, zones=of_problem))
+            errors.append(mesh_estimate.energy_errors(problem.cell, group, touches, zones=tip_zones))
             shares = errors[-1].shares.T
             estimated += [replace(response, shares=part) for response, part in zip(group, shares, strict=True)]
         return errors, estimated
@@ -194,17 +182,24 @@ class AnalysisContext:
     ) -> tuple[dict[str, Float], list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
         """Solve for `sign` times the unit loads, estimate mesh errors, and record the states.  Collective.
 
-        Returns `CellLoads.secants`, errors and responses.  A state has the name `label` + load, with a minus for a
-        negative `sign`; see `StateRecorder.record`.
+        The solves start from the multipliers `starts`.  Returns `CellLoads.secants`, errors and responses.  A state has
+        the name `label` + load, with a minus for a negative `sign`; see `StateRecorder.record`.
         """
-        columns, responses = self.unit_responses(label, bonds, starts, sign)
+        prefix = f"{label}-" if sign < 0 else label
+        responses = list[averaging.Response]()
+        for problem in self.loads.problems:
+            first, count = len(responses), len(problem.loads)
+            responses += problem.respond(sign * np.eye(count), bonds, starts[first : first + count])
+            for name, response in zip(problem.loads, responses[first:], strict=True):
+                self.progress.say(self.checks.record(f"{prefix}{name}", response))
+        columns = self.loads.secants(responses, sign)
         errors, responses = self.response_errors(self.loads.by_problem(responses))
-        in_plane = len(self.plane.loads) * self.cell.solver.problem.turns
-        pairs = dict[str, Sequence[averaging.Response | None]]()
+
+        in_plane = len(self.plane.loads) if self.cell.solver.problem.turns else 0
+        states = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
-            state = (response, None) if number < in_plane else (None, response)
-            pairs[f"{label}{'-' if sign < 0 else ''}{name}"] = state
-        self.states.record(pairs, sign, point)
+            states[f"{prefix}{name}"] = (response, None) if number < in_plane else (None, response)
+        self.states.record(states, sign, point)
         return columns, errors, responses
 
     @cached_property
@@ -233,7 +228,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Build result.json entries: debonding of the last plane response, and the sum of iterations.  Collective."""
+        """Build result.json entries: debonding under gamma12 or the only load, and summed iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

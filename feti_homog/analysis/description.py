@@ -28,33 +28,31 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
         inner, parts = lattice.intervals - 1, map(refinement.halved, part.submeshes.cut())
         nodes = sum(len(s.class_keys) + inner * (len(s.edge_keys) + (inner - 1) * len(s.triangles) // 2) for s in parts)
-        loads = comm.gather((len(part.submeshes.index), nodes)) or []
-        c = [problem.components for problem in phase_laws.problems(case)]
-        options, summary, multipliers = solver_plan.database_options(), part.summary, c[0] * constraints
-        pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
+        counts = comm.gather((len(part.submeshes.index), nodes)) or []
+        cell, summary, options = case.cell, part.summary, solver_plan.database_options()
+        components = [problem.components for problem in phase_laws.problems(case)]
 
-        def described() -> str:
-            cell, (subdomains, nodes) = case.cell, zip(*loads, strict=True)
+        def lines() -> Iterator[str]:
+            subdomains, nodes = zip(*counts, strict=True)
+            elements, dofs = summary.coarse_triangles * len(lattice.triangles), sum(components) * sum(nodes)
+            yield f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}"
+            yield f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}"
+            if summary.voids:
+                yield f"voids      {summary.voids}"
+            mesh = f"{summary.coarse_triangles} coarse triangles, {elements} elements of order {cell.order}"
+            yield f"mesh       {mesh}, {dofs} degrees of freedom"
+            if cell.accuracy is not None:
+                yield f"sizes      mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
+            yield from _fibre_lines(case, summary)
+            pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
+            yield f"tearing    {summary.bodies} bodies, {pieces}, {sum(components) * constraints} multipliers"
+            yield from _cost_lines(case, summary, components[0] * constraints, options, subdomains, nodes)
             unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge, summary.radii)
-            sizes = f"mesh_size = {cell.mesh_size:g}, refine = {cell.refine}, as asked for by accuracy"
-            lines = [
-                f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
-                f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
-                *([f"voids      {summary.voids}"] if summary.voids else []),
-                f"mesh       {summary.coarse_triangles} coarse triangles, "
-                f"{summary.coarse_triangles * len(lattice.triangles)} elements of order {cell.order}, "
-                f"{sum(c) * sum(nodes)} degrees of freedom",
-                *([] if cell.accuracy is None else [f"sizes      {sizes}"]),
-                *_fibre_lines(case, summary),
-                f"tearing    {summary.bodies} bodies, {pieces}, {sum(c) * constraints} multipliers",
-                *_cost_lines(case, summary, multipliers, options, subdomains, nodes),
-                *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
-                *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
-                "the case is valid",
-            ]
-            return "\n".join(lines)
+            yield from (f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved))
+            yield from (f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks))
+            yield "the case is valid"
 
-        return mpi_errors.on_root_only(comm, described) or ""
+        return mpi_errors.on_root_only(comm, lambda: "\n".join(lines())) or ""
 
 
 def _cost_lines(
@@ -70,11 +68,12 @@ def _cost_lines(
     `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError
     like `solver_plan.choose`, or if a case with friction has no influence columns.
     """
-    problems, ranks, dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
+    problems, ranks, is_dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across
     one_each = summary.across and ranks > 1 and set(subdomains) == {1}
     applications = max(partition_policy.applications(case, problem, summary.across) for problem in problems)
-    sizes = solver_plan.ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
+    # Dense operators can be searched for soft modes.
+    sizes = solver_plan.ProblemSizes(applications, summary.is_cut, is_dense, is_dense, multipliers, has_thin, one_each)
     plan = solver_plan.choose(sizes, options)
     if case.has_friction and plan.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)
@@ -88,8 +87,9 @@ def _cost_lines(
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""
-    few, noun = partition_policy.in_words(memory), "rank" if ranks == 1 else "ranks"
-    yield f"estimate   on {ranks} {noun} at most about {few} per rank{all_bonds}, without pictures"
+    noun = "rank" if ranks == 1 else "ranks"
+    size = partition_policy.in_words(memory)
+    yield f"estimate   on {ranks} {noun} at most about {size} per rank{all_bonds}, without pictures"
     most, limit = (summary.coarse_triangles, "") if summary.across else (summary.bodies, ", at most one rank per body")
     useful = partition_policy.recommended_ranks(sum(components) * sum(nodes), most)
     yield f"ranks      recommended: {useful} ({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})"

@@ -17,7 +17,8 @@ from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, c
 from feti_homog.case import load_sections
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import averaging
-from feti_homog.interface.laws import UTILISATION_TIE, BondLaw
+from feti_homog.interface.contact import BondState
+from feti_homog.interface.laws import UTILISATION_TIE
 from feti_homog.interface.path import onsets
 from feti_homog.materials import voigt
 from feti_homog.typing import Float, Int
@@ -52,24 +53,19 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)
     if not context.plane.interface.is_linear(bonds.status):
-        raise CaseError(
-            '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
-            'superposes loads, which contact forbids: type = "path" finds the onset of one load'
-        )
+        reason = '[analysis] type = "envelope" superposes loads, which contact forbids'
+        cure = 'type = "path" finds the onset of one load'
+        raise CaseError(f"[interface] contact: expected false with a debonded curve of the mesh; {reason}: {cure}")
     columns, errors, responses = context.unit_states(bonds, context.loads.zero_multipliers())
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
-    law = criterion_of(context.cell)
-    finder = _Finder(context, responses, law, onsets.Onset.of(law, context.loads.interfaces, bonds))
-    pairs = zip(angles, finder.points(rays), strict=True)
+    pairs = zip(angles, _Finder(context, responses, bonds).points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
     if points[0].factor == 0.0:
-        change = f"[envelope] temperature = {section.temperature:g}"
-        context.notes.append(
-            f"{change}: it breaks bonds alone, so that all loads at onset are 0; expected a smaller one"
-        )
+        fault = "it breaks bonds alone, so that all loads at onset are 0; expected a smaller one"
+        context.notes.append(f"[envelope] temperature = {section.temperature:g}: {fault}")
     secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
     secants |= constants(context.cell, secants)
     return {"envelope": points} | secants | mesh_error(context, secants, errors, [])
@@ -91,20 +87,20 @@ def rays_of(
     loads[:, [names.index(name) for name in plane]] = np.where(np.abs(unit) < np.finfo(float).eps, 0.0, unit)
     heat_stress = zero if thermal_stress is None else temperature * thermal_stress
     if by_stress:
-        strain, heat_strain = (np.asarray(np.linalg.solve(stiffness, s), float) for s in (loads.T, -heat_stress))
-        return Rays(strain.T, loads, heat_strain, zero, temperature)
+        strain = np.asarray(np.linalg.solve(stiffness, loads.T), float).T
+        heat_strain = np.asarray(np.linalg.solve(stiffness, -heat_stress), float)
+        return Rays(strain, loads, heat_strain, zero, temperature)
     return Rays(loads, loads @ stiffness.T, zero, heat_stress, temperature)
 
 
 class _Finder:
     """A search for the first bond that breaks on each ray."""
 
-    def __init__(
-        self, context: AnalysisContext, responses: Sequence[averaging.Response], law: BondLaw, onset: onsets.Onset
-    ) -> None:
-        """Collect the tractions on this rank's bonds under the unit loads.  Collective."""
-        cell = context.cell
-        self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
+    def __init__(self, context: AnalysisContext, responses: Sequence[averaging.Response], bonds: BondState) -> None:
+        """Collect the tractions on this rank's bonds under the unit loads.  Collective; raises like `criterion_of`."""
+        cell, law = context.cell, criterion_of(context.cell)
+        self._comm, self._loads, self._law = cell.comm, context.loads.names, law
+        self._onset = onsets.Onset.of(law, context.loads.interfaces, bonds)
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
         # (l, k, c) tractions at this rank's nodes by unit load: normal, tangential, and axial in space.
         components = [problem.cell.solver.problem.components for problem in context.loads.problems]
@@ -181,12 +177,13 @@ class _Finder:
         best = np.full((n, 4 + len(self._break_names)), np.inf)
         best[:, 0] = smallest
         together = factors[:, self._order] <= smallest[:, None] * (1.0 + UTILISATION_TIE)
-        rays = np.flatnonzero(together.any(axis=1) & np.isfinite(smallest))
-        node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
-        best[rays, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])
-        traction = before[node] + smallest[rays, None] * directions[rays, node]
-        best[rays, 4:] = self._law.at(node).breaks(traction)
+        breaking = np.flatnonzero(together.any(axis=1) & np.isfinite(smallest))
+        node: Int = self._order[together[breaking].argmax(axis=1)] if len(breaking) else np.zeros(0, np.int64)
+        best[breaking, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])
+        traction = before[node] + smallest[breaking, None] * directions[breaking, node]
+        best[breaking, 4:] = self._law.at(node).breaks(traction)
         table = np.stack(self._comm.allgather(best))
-        first = np.lexsort((np.round(table[:, :, 3], DIRECTION_DIGITS), table[:, :, 2], table[:, :, 1]), axis=0)[0]
-        bonds: list[list[float]] = table[first, np.arange(n)].tolist()
+        fibre, pair, direction = np.moveaxis(table[:, :, 1:4], 2, 0)
+        first_rank = np.lexsort((np.round(direction, DIRECTION_DIGITS), pair, fibre), axis=0)[0]
+        bonds: list[list[float]] = table[first_rank, np.arange(n)].tolist()
         return bonds

@@ -13,11 +13,12 @@ from feti_homog.materials import voigt
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entry `load`, the equilibrium with prescribed debonded faces.  Collective.
 
-    The point has `tips` on debonded arcs.  The case may also ask for `sensitivities`.
+    With interfaces the point has `tips`, empty without debonded arcs.  The case may also ask for `sensitivities`.
+    Raises NotCarriedError if the cell does not carry the stresses.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
-    load, bonds = context.loads.load(target), context.bonds(None)
-    state = cell.equilibrium(load, bonds, cell.no_multipliers())
+    load = context.loads.load(target)
+    state = cell.equilibrium(load, context.bonds(None), cell.no_multipliers())
     responses = context.loads.responses(state, 1.0)
     for response, problem in zip(responses, ("load", "load, along the fibres"), strict=False):
         context.progress.say(context.checks.record(problem, response))

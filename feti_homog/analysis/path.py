@@ -29,15 +29,16 @@ NAMED_FIBRES = 8  # most fibre names in a remark
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Follow the path of the case and return its `Result` entries.  Collective.
 
-    `path` has each event or increment, `peak` the landmarks, `states` the numbers of recorded points, and `resumed` the
-    count of restored points; new converged points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
+    `path` has each event or increment, `peak` the landmarks, `resumed` the count of restored points, and `states` the
+    numbers of the points with recorded fields, if any; without points only `path` and `resumed` exist.  New converged
+    points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
     """
     path, law, cell = context.case.section, criterion_of(context.cell, grows=True), context.loads.interfaces
     assert isinstance(path, load_sections.LoadPath)
     check_accuracy(context)
     count = min(path_events.resumable(context), path.max_events)
-    work, entries, last = path_events.Work(), list[dict[str, Any]](), None
-    bonds, top = list[tuple[float, float]](), ""
+    work, last, top = path_events.Work(), None, ""
+    entries, bonds = list[dict[str, Any]](), list[tuple[float, float]]()
     may_fall = any(map(context.case.targets[0].get, voigt.SPATIAL_STRESSES))  # until a line reports the fall
     with stepped_progress.shown(context.progress, "load") as advance:
         for number, (point, before, responses) in enumerate(_points(context, path, law, count)):
@@ -45,9 +46,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
                 work.arrive(point)
                 bonds.append(most_utilised_bond(context, law, point))
             else:
-                work.resume_from(*before[:2], point)
-                bonds.append(before[2])
-            entries.append(entry := _entry(context, law, point, responses, work))
+                energies, load_controlled, bond = before
+                work.resume_from(energies, load_controlled, point)
+                bonds.append(bond)
+            entry = _entry(context, law, point, responses, work)
+            entries.append(entry)
             if before is None and point.state.converged:
                 event = path_events.stored(point, bonds[-1], responses, work, cell, _without_lists(entry))
                 _keep(context, number, event)
@@ -55,11 +58,12 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             _record_checks(context, f"{_label(path, number)} {place}", responses, is_first=number == 0)
             points = f"{len(entries)} {path.method.removesuffix('s') if len(entries) == 1 else path.method}"
             counts = f"{points}, {entry['bonded']} bonded, {entry['open'] + entry['closed']} broken"
-            if (d := law.damage(point.state.bonds)) is not None:
-                counts += f", {context.cell.comm.allreduce(int(((d > 0.0) & (d < 1.0)).sum()))} damaged"
+            if (damage := law.damage(point.state.bonds)) is not None:
+                counts += f", {context.cell.comm.allreduce(int(((damage > 0.0) & (damage < 1.0)).sum()))} damaged"
             is_known = number == 0 or before is not None  # the first break takes much of the load, and no time
             advance(point.load_factor, len(entries), counts, is_known)
-            top = place if point.load_factor == work.largest_load else top
+            if point.load_factor == work.largest_load:
+                top = place
             if may_fall and point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load:
                 way = "the path ends at load factor 1, perhaps much later; with a prescribed strain it ends earlier"
                 context.progress.say(f"  the load falls from its largest value so far, {top}; {way}")
@@ -68,10 +72,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
-                context.checks.faults.append(
-                    f"[path] max_events = {path.max_events}: the path was not finished: result.json has status "
-                    f'"not converged"; --resume with a higher max_events goes on{context.case.fewer_events}'
-                )
+                end = 'the path was not finished: result.json has status "not converged"'
+                cure = f"--resume with a higher max_events goes on{context.case.fewer_events}"
+                context.checks.faults.append(f"[path] max_events = {path.max_events}: {end}; {cure}")
                 break
     if last is None:
         return {"resumed": count, "path": ()}
@@ -102,12 +105,10 @@ def _record_checks(
 
 def _points(
     context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
-) -> Iterator[
-    tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]] | None, list[averaging.Response]]
-]:
+) -> Iterator[tuple[path_points.Point, path_events.Before | None, list[averaging.Response]]]:
     """Yield each point with its responses.  Collective.
 
-    First come the `stored_events` of the checkpoint, with the triple from `path_events.restored`, then new points with
+    First come the `stored_events` of the checkpoint, with the result of `path_events.restored`, then new points with
     None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no equilibrium.
     Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
@@ -187,7 +188,8 @@ def _entry(
         entry["friction_heat"] = energies.friction
     if law.has_toughness:
         entry["fracture_energy"] = energies.fracture
-        entry |= {"dissipation_ratio": energies.released / energies.fracture} if energies.fracture else {}
+        if energies.fracture:
+            entry["dissipation_ratio"] = energies.released / energies.fracture
     return entry | context.loaded_point(responses)
 
 
@@ -199,13 +201,13 @@ def _completed(
     bonds: Sequence[tuple[float, float]],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Return the `Result` entries `path`, `peak` and `states` of a finished path.  Collective.
+    """Return the `Result` entries `path`, `peak` and, with recorded fields, `states` of a path.  Collective.
 
     Marks landmarks in `entries`, adds tips and mesh errors at the kept points, records fields there, and drops lists
     over fibres elsewhere.  `peak` names the most utilised of `bonds`.  The checkpoint has all kept points but the last.
     """
     document = {"case": context.case.resolved(), "path": entries}
-    marks, states = landmarks.marks(document), dict[str, Any]()
+    marks = landmarks.marks(document)
     legs = len(context.case.targets) if path.method == "events" else 0
     numbers = landmarks.kept(entries, context.case.output.states, legs, marks)
     for number in {*range(len(entries))}.difference(numbers):
@@ -222,16 +224,15 @@ def _completed(
                     entries[number] |= error
                     context.states.record({_label(path, number): responses}, point.load_factor, number)
             line.append(f"{len(numbers)} of {len(entries)} points")
-        states = {"states": numbers} if context.states.is_recording else {}
     else:
         _checked(context, last, _label(path, len(entries) - 1))
     if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
-        names = ", ".join(map(str, loose[:NAMED_FIBRES])) + (", ..." if len(loose) > NAMED_FIBRES else "")
+        more = ", ..." if len(loose) > NAMED_FIBRES else ""
+        names = f"{', '.join(map(str, loose[:NAMED_FIBRES]))}{more}"
         fibres = f"{len(loose)} fibres ({names})" if len(loose) > 1 else f"fibre {names}"
-        context.notes.append(
-            f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
-            "and the path follows one of them, which depends on the order of nodes"
-        )
+        several = "with friction such a fibre may have several equilibria under one load"
+        choice = "the path follows one of them, which depends on the order of nodes"
+        context.notes.append(f"[path] no bond of {fibres} holds: {several}, and {choice}")
     if context.case.has_friction and not any(entry["open"] or entry["closed"] for entry in entries):
         context.notes.append("[interface] friction: without effect, for no face is debonded and no bond breaks")
     for number, mark in marks.items():
@@ -243,6 +244,7 @@ def _completed(
             peak |= {f"{title}fibre": int(fibre), f"{title}angle": angle}
     phases = records.plain(context.states.phase_stresses() or ())
     context.notes += landmarks.passed_strengths(document | {"phase_stresses": phases}, peak, numbers)
+    states = {"states": numbers} if context.states.is_recording else {}
     return {"path": tuple(PathPoint(**entry) for entry in entries), "peak": Peak(**peak)} | states
 
 

@@ -24,6 +24,9 @@ EMPTY = np.zeros(0)
 SUFFIXES = ("", "_axial")  # array name endings of the plane and the axial problem
 UNKNOWN = ("alpha", "broken", "certificate", "bond")  # arrays with NaN for missing numbers
 
+Before = tuple[path_points.Energies, float, tuple[float, float]]
+"""Energies up to a stored point, `Work.load_controlled`, and the point's most utilised bond."""
+
 
 @dataclass
 class Work:
@@ -81,9 +84,8 @@ def stored(
         "point": result_json.text_of(entry),
     }
     distributed = _bond_arrays(after.bonds, "_after")
-    for suffix, interface, response, state in zip(
-        SUFFIXES, cell.problems, responses, point.state.problems, strict=False
-    ):
+    problems = zip(SUFFIXES, cell.problems, responses, point.state.problems, strict=False)
+    for suffix, interface, response, state in problems:
         solution = state.solution
         alpha = solution.alpha  # None: F lambda did not confirm the solution
         of_problem = {
@@ -106,41 +108,31 @@ def stored(
     return numbers, distributed
 
 
-def restored(
-    event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces
-) -> tuple[path_points.Point, tuple[path_points.Energies, float, tuple[float, float]]]:
+def restored(event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces) -> tuple[path_points.Point, Before]:
     """Rebuild a path point from an event.
 
-    Returns the point, and a triple: energies up to this point, `Work.load_controlled`, and the most utilised bond.
     Arrays for which the checkpoint had no room are empty; `found_again` computes them.
     """
     states = list[Equilibrium]()
     for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
         lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
-        iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
+        iterations, solves, free_motions, steps, reason = event[f"numbers{suffix}"].tolist()
         errors = zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True)
         certificate = {law: error for law, error in errors if not np.isnan(error)}
         values, by_stress = event[f"load{suffix}"]
         bonds, residual = _bond_state(event, suffix), float(event[f"residual{suffix}"])
         amplitudes = None if np.isnan(alpha).any() else alpha
         compliance = interface.compliance(bonds)
-        solution = DualSolution(event[f"strain{suffix}"], lam, jump, amplitudes, last, reason, residual, compliance)
+        solution = DualSolution(event[f"strain{suffix}"], lam, jump, amplitudes, steps, reason, residual, compliance)
         load, asked = Load(values, by_stress.astype(bool)), event[f"asked{suffix}"]
         states.append(Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked))
     state = replace(states[0], axial=states[1]) if len(states) > 1 else states[0]
     load_factor, scale, leg, position, *counts = event["path"].tolist()
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
-    broken = float(event["broken"])
-    after = path_points.PathState(
-        int(leg),
-        position,
-        _bond_state(event, "_after"),
-        state.multipliers,
-        Macroscopic(origin_strain, origin_stress),
-        Macroscopic(strain, stress),
-        None if np.isnan(broken) else broken,
-        float(event["stretched"]),
-    )
+    origin, last = Macroscopic(origin_strain, origin_stress), Macroscopic(strain, stress)
+    broken = None if np.isnan(event["broken"]) else float(event["broken"])
+    bonds, stretched = _bond_state(event, "_after"), float(event["stretched"])
+    after = path_points.PathState(int(leg), position, bonds, state.multipliers, origin, last, broken, stretched)
     n, energies = len(path_points.NO_ENERGIES), event["energies"].tolist()
     since_last, up_to_point = path_points.Energies(*energies[:n]), path_points.Energies(*energies[n : 2 * n])
     broke, softened = map(int, counts)
@@ -175,7 +167,9 @@ def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, pat
     """Read an event and rebuild its path point; solve for missing multipliers.  Collective; may raise CaseError."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
-    return event, point if "lam" in event else found_again(point, cell)
+    if "lam" not in event:
+        point = found_again(point, cell)
+    return event, point
 
 
 def resumable(context: AnalysisContext) -> int:
@@ -189,18 +183,21 @@ def resumable(context: AnalysisContext) -> int:
         context.checkpoint.clear()  # events of other runs, which `output_folder.replaced` names
         return 0
     stored_events = context.checkpoint.count()
-    if (count := holding(context, consistent(context, stored_events))) < stored_events:
+    if not stored_events:
+        say("  there is no checkpoint: the path starts from the beginning")
+        return 0
+    count = holding(context, consistent(context, stored_events))
+    if count < stored_events:
         say(f"  event {count} of the checkpoint is invalid: the run computes it and all later events again")
-    begin = "there is no checkpoint: the path starts from the beginning"
-    say(f"  {f'{count} events are taken from the checkpoint' if stored_events else begin}")
+    say(f"  {count} events are taken from the checkpoint")
     return count
 
 
 def consistent(context: AnalysisContext, count: int) -> int:
     """Count the first events whose arrays, bonds, loads and energies fit the path.  Collective; raises like `read`."""
     cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
-    waypoints = [context.loads.load(target) for target in context.case.targets]
-    waypoints, legs = [Load(0.0 * waypoints[0].values, waypoints[0].by_stress), *waypoints], len(waypoints)
+    ends = [context.loads.load(target) for target in context.case.targets]
+    waypoints, legs = [Load(0.0 * ends[0].values, ends[0].by_stress), *ends], len(ends)
     for number in range(count):
         event = context.checkpoint.read(number)
         parted = context.cell.comm.allgather(_parted(context, event, layout, bonds))
@@ -237,7 +234,7 @@ def holding(context: AnalysisContext, count: int) -> int:
         if not waiting:
             break
         first -= 1
-    for number in range(max(min(first, count - 1), 0), count):
+    for number in range(max(min(first, count - 1), 0), count):  # the last event, if any, in any case
         event, point = read(context, number)
         responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
         for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
@@ -270,10 +267,12 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
     """Count this rank's bonds that part.  Returns -1 for wrong arrays, impossible numbers, or bonds that heal."""
-    kept = {name: of for name, of in layout.items() if "lam" in event or not checkpoints.FOUND_AGAIN.fullmatch(name)}
-    if {name: (array.dtype.char, array.shape) for name, array in event.items()} != kept:
+    has_all = "lam" in event
+    expected = {name: kind for name, kind in layout.items() if has_all or not checkpoints.FOUND_AGAIN.fullmatch(name)}
+    if {name: (array.dtype.char, array.shape) for name, array in event.items()} != expected:
         return -1
-    states = [before, *(_bond_state(event, suffix) for suffix in (*SUFFIXES[: len(context.loads.problems)], "_after"))]
+    suffixes = (*SUFFIXES[: len(context.loads.problems)], "_after")
+    states = [before, *(_bond_state(event, suffix) for suffix in suffixes)]
     holds = min(event["path"][4:].min(), event["numbers"].min()) >= 0 and np.isnan(event["bond"]).sum() != 1
     for name, array in event.items():
         known = array[~np.isnan(array)] if name.startswith(UNKNOWN) else array

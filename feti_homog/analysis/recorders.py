@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from feti_homog.analysis.cell_records import PhaseStresses
 from feti_homog.analysis.result import Fields
@@ -21,7 +22,7 @@ CHECK_ERROR_PER_RTOL = 1e3
 MAX_CHECK_ERROR = 1e-4
 # Largest error of the KKT conditions that passes, relative to the scales of `contact.states.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
-MOST_ITERATIONS, CURE = -3, "; raise -feti_ksp_max_it"  # KSP_DIVERGED_ITS
+CURE = "; raise -feti_ksp_max_it"
 
 
 @dataclass
@@ -48,21 +49,21 @@ class CheckRecorder:
         A solve without convergence and a failed check are faults.
         """
         state, error = response.state, response.checks.get("jump")
+        reason = state.solution.reason
         self.iterations.append(state.iterations)
-        self.reasons.append(state.solution.reason)
-        without = "by the factor of the cell" if response.checks.keys() & {"hill"} else "by influence columns"
+        self.reasons.append(reason)
+        without = "by the factor of the cell" if "hill" in response.checks else "by influence columns"
         jump = without if error is None else f"relative jump {error:.1e}"
         line = f"{state.iterations or 'no'} iterations, {jump}"
         if response.debonded:
             line += f", {response.debonded} debonded ({response.counts['closed']} closed), solves: {state.solves}"
         if state.free_motions:
             line += f", {state.free_motions} free motions"
-        if state.solution.reason < 0:
-            is_first = state.solution.reason == MOST_ITERATIONS and not any(CURE in fault for fault in self.faults)
-            self.faults.append(
-                f"{name}: no convergence after {state.iterations} iterations, {jump} "
-                f"(KSPConvergedReason {state.solution.reason}); result marked{CURE if is_first else ''}"
-            )
+        if reason < 0:
+            is_limit = reason == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
+            cure = CURE if is_limit and not any(CURE in fault for fault in self.faults) else ""
+            fault = f"no convergence after {state.iterations} iterations, {jump} (KSPConvergedReason {reason})"
+            self.faults.append(f"{name}: {fault}; result marked{cure}")
         self.require(name, response.checks)
         return f"  {name}: {line}"
 
@@ -70,7 +71,8 @@ class CheckRecorder:
         """Record the errors of laws; NaN and exceeded tolerances are faults."""
         for law, error in errors.items():
             self.errors[law] = max(error, self.errors.get(law, 0.0))
-            if not error <= (tolerance := self.tolerance(law)):
+            tolerance = self.tolerance(law)
+            if not error <= tolerance:
                 self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
 
     def tolerance(self, law: str) -> float:
@@ -83,10 +85,8 @@ class CheckRecorder:
         """Return a warning line if the solver tolerance is looser than the checks, else []."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
-        return [
-            f"-feti_ksp_rtol {self.rtol:g} asks for less than the checks do: the result is marked unless their errors "
-            f"are at most {MAX_CHECK_ERROR:g}"
-        ]
+        end = f"the result is marked unless their errors are at most {MAX_CHECK_ERROR:g}"
+        return [f"-feti_ksp_rtol {self.rtol:g} asks for less than the checks do: {end}"]
 
 
 class StateRecorder:
@@ -149,16 +149,17 @@ class StateRecorder:
 
     def _of_phase(self, phase: str) -> PhaseStresses:
         cell, columns = self._cell, dict[str, Any]()
-        limit, origin = cell.case.material_of(phase).strength, cell.summary.origin
-        arrays = zip(*(state[phase] for state in self._largest), strict=True)
-        by_measure = (np.split(np.stack(array), (1, 2, 3), axis=1) for array in arrays)
-        for name, values, places in zip(recovered_fields.MEASURES, *by_measure, strict=True):
-            if values.size:  # the utilisation has a column for each mode, or none
-                modes, states = values.argmax(axis=1), np.arange(len(values))
-                columns |= {name: values[states, modes], f"{name}_at": places[states, modes] + origin}
-        if limit is not None:
-            columns["criterion"] = material_forms.criterion(limit)
-            columns["mode"] = tuple(map(material_forms.MODES.__getitem__, modes)) if values.shape[1] > 1 else None
+        strength, origin = cell.case.material_of(phase).strength, cell.summary.origin
+        values, positions = (np.stack(rows) for rows in zip(*(state[phase] for state in self._largest), strict=True))
+        # Each measure has one column; the utilisation, the last measure, has a column for each mode, or none.
+        by_measure = np.split(values, (1, 2, 3), axis=1), np.split(positions, (1, 2, 3), axis=1)
+        for name, of_modes, places in zip(recovered_fields.MEASURES, *by_measure, strict=True):
+            if of_modes.size:
+                modes, states = of_modes.argmax(axis=1), np.arange(len(of_modes))
+                columns |= {name: of_modes[states, modes], f"{name}_at": places[states, modes] + origin}
+        if strength is not None:
+            columns["criterion"] = material_forms.criterion(strength)
+            columns["mode"] = tuple(material_forms.MODES[k] for k in modes) if of_modes.shape[1] > 1 else None
         return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:

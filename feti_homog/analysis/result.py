@@ -199,9 +199,9 @@ class Result:
         if curve is None or self.peak is None:
             raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
         sign = np.sign((self.path or ())[-1].strain[path_curves.leading_component(self.document)])
-        names = (*voigt.voigt_names(curve.shape[1] - 1)[1], self.peak.strain_name)
-        columns = dict(zip(names, (curve * [*[1.0] * (len(names) - 1), sign]).T, strict=True))
-        return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
+        _, names = voigt.voigt_names(curve.shape[1] - 1)
+        stresses = dict(zip(names, curve[:, :-1].T, strict=True))
+        return {self.peak.strain_name: sign * curve[:, -1]} | stresses
 
     def __getattr__(self, name: str) -> Any:
         """Return a number by its name in a record of CONSTANTS, such as E1.

@@ -123,7 +123,7 @@ def _run_and_write(
         # No function in the context may refer to the context: garbage collection on one rank would then close the
         # parallel file, which is a collective call.
         context = replace(context, directory=directory, resume=resume, log=log.write, events=result_json.LOG)
-        context.opening = lambda of: result_json.text_of(records.plain(_opening(of)))
+        context.opening = lambda itself: result_json.text_of(records.plain(_opening(itself)))
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
@@ -159,10 +159,13 @@ def _run_and_write(
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
     """Write result.json and the other result files; remove files of earlier results.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME} | ({result_json.LOG} if cell.case.section.is_followed else set())
+    written = {result_json.NAME}
+    if cell.case.section.is_followed:
+        written.add(result_json.LOG)
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in mpi_errors.on_root(cell.comm, xdmf.write, directory))}
-    points = vars(result).get(name := cell.case.analysis.type)
+    name = cell.case.analysis.type
+    points = vars(result).get(name)
     if points is not None:
         rows = points if isinstance(points, tuple) else (points,)
         written.add(mpi_errors.on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
@@ -187,10 +190,9 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
     """Return the `Result` entries known before the analysis, with errors and times so far.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions, options = cell.fractions(), options_database.choices("feti_")
-    # Straight edges cut off a part of the fibres.
-    area = sum(cell.case.cell.fractions.values())
+    asked = sum(cell.case.cell.fractions.values())
     meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
-    lost = 1.0 - meshed / area if area and cell.case.cell.order == 1 else 0.0
+    lost = 1.0 - meshed / asked if asked and cell.case.cell.order == 1 else 0.0
     polygons = f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2"
     lost_area = [polygons] if lost > REMARKABLE_LOSS else []
     cell_info = CellInfo(

@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from feti_homog.analysis.cell_records import Sensitivities
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.homogenization import averaging, phase_laws, stiffness_derivatives, unit_cell
+from feti_homog.homogenization import averaging, phase_laws, stiffness_derivatives
 from feti_homog.interface import Load
 from feti_homog.materials import engineering_constants, material_derivatives, voigt
 from feti_homog.typing import Float
@@ -29,24 +29,26 @@ def sensitivities(
         responses: the responses to all unit loads.
         one_sided: whether debonded faces touch without tension; then faces are fixed in the derivative of each column.
     """
-    k, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
-    if k is not None:
-        rates = stiffness_derivatives.derivatives(_cells(context), groups)
-        return _entry(_entries(k, None, "k"), {(e.name, e.value): e.energies[0].ravel().tolist() for e in rates}, False)
-    C, thermal, columns = document["effective_stiffness"], document.get("thermal_stress"), dict[Constant, list[float]]()
+    conductivity, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
+    columns = dict[Constant, list[float]]()
+    if conductivity is not None:
+        for change in stiffness_derivatives.derivatives(context.cell.problems, groups):
+            columns[change.name, change.value] = change.energies[0].ravel().tolist()
+        return _entry(_entries(conductivity, None, "k"), columns, False)
+    C, thermal = document["effective_stiffness"], document.get("thermal_stress")
     if not one_sided:
-        for change in stiffness_derivatives.derivatives(_cells(context), groups):
+        for change in stiffness_derivatives.derivatives(context.cell.problems, groups):
             changes = material_derivatives.constant_changes(C, thermal, *_secants(change.energies))
             columns[change.name, change.value] = [*changes.values()]
         return _entry(engineering_constants.constants(C, thermal), columns, False)
     plane, *axial = groups
     energies = dict[Constant, list[Float]]()
-    for k, (name, response) in enumerate(zip(context.plane.loads, plane, strict=True)):
+    for number, (name, response) in enumerate(zip(context.plane.loads, plane, strict=True)):
         fixed = _at_status(context, name, [response], [0])
-        for change in stiffness_derivatives.derivatives(_cells(context), [*fixed, *axial]):
+        for change in stiffness_derivatives.derivatives(context.cell.problems, [*fixed, *axial]):
             in_plane, *along_fibres = change.energies
             matrices = energies.setdefault((change.name, change.value), [np.zeros_like(in_plane), *along_fibres])
-            matrices[0][:, k] = in_plane[:, k]
+            matrices[0][:, number] = in_plane[:, number]
     columns = {key: [*_entries(*_secants(matrices)).values()] for key, matrices in energies.items()}
     return _entry(_entries(C, thermal), columns, True)
 
@@ -66,12 +68,11 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
     names = [name if is_free else stress.get(name) for name, is_free in zip(context.loads.names, free, strict=True)]
 
     def entries(x: Float, s: Float, stored: float) -> dict[str, float]:
-        free_values = np.where(free, x, s).tolist()
-        pairs = zip(names, free_values, strict=True)
+        pairs = zip(names, np.where(free, x, s).tolist(), strict=True)
         return {name: value for name, value in pairs if name is not None} | {"stored": stored}
 
     columns = dict[Constant, list[float]]()
-    for change in stiffness_derivatives.derivatives(_cells(context), fixed):
+    for change in stiffness_derivatives.derivatives(context.cell.problems, fixed):
         dA, dx = block_diag(*change.energies), np.zeros(len(x))
         dx[free] = np.linalg.lstsq(A[np.ix_(free, free)], -(dA @ x)[free], rcond=None)[0]
         ds = dA @ x + A @ dx
@@ -80,9 +81,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
     return _entry(entries(x, s, float(x @ s) / 2), columns, is_one_sided)
 
 
-def _entry(
-    values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
-) -> dict[str, Any]:
+def _entry(values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], is_fixed: bool) -> dict[str, Any]:
     """Build the entry `sensitivities` from values, derivatives (`columns`) by parameter, and `at_fixed_status`."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
@@ -91,13 +90,9 @@ def _entry(
         constants=tuple(values),
         constant_values=np.array([*values.values()]),
         derivatives=matrix.reshape(len(values), len(columns)),
-        at_fixed_status=at_fixed_status,
+        at_fixed_status=is_fixed,
     )
     return {"sensitivities": record}
-
-
-def _cells(context: AnalysisContext) -> list[unit_cell.TornCell]:
-    return [problem.cell for problem in context.loads.problems]
 
 
 def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
@@ -109,7 +104,8 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, float]:
     """Return the entries of a stiffness or conductivity, and the normal thermal stresses, if any, by name."""
     entries = {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
-    return entries | dict(zip(voigt.THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
+    normal = {} if thermal is None else dict(zip(voigt.THERMAL_STRESSES[:3], map(float, thermal[:3]), strict=True))
+    return entries | normal
 
 
 def _at_status(
@@ -120,14 +116,15 @@ def _at_status(
     `states` are the responses of this state.  The result is a list of responses for each number in `problems`.
     """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
-    for problem in (context.loads.problems[k] for k in problems):
+    for number in problems:
+        problem, fixed = context.loads.problems[number], list[averaging.Response]()
         count, zero = len(problem.loads), np.zeros(problem.cell.solver.rows)
-        groups.append([])
         equilibria = problem.interface.equilibria(np.eye(count), bonds, [zero] * count)
         for load, state in zip(problem.loads, equilibria, strict=True):
             response = problem.response(state, 1.0)
             # Fixed faces may pull and overlap; the laws of contact are checked for the state itself.
             checks = {law: error for law, error in response.checks.items() if not law.startswith("kkt_")}
-            groups[-1].append(replace(response, checks=checks))
-            context.checks.record(f"{name}, derivatives, {load}", groups[-1][-1])
+            fixed.append(replace(response, checks=checks))
+            context.checks.record(f"{name}, derivatives, {load}", fixed[-1])
+        groups.append(fixed)
     return groups

@@ -25,7 +25,8 @@ def shown(
         yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")
         return
     begin = clock()
-    reached, next_line, since = 0.0, begin + SECONDS_A_LINE, (begin, 0.0, 0)
+    reached, next_line = 0.0, begin + SECONDS_A_LINE
+    known_time, known_share, known_count = begin, 0.0, 0  # at the last known step
     bar: Any = None
     if progress.on_terminal:
         from tqdm import tqdm  # unused in most runs, and slow to import
@@ -35,11 +36,13 @@ def shown(
         bar = tqdm(total=1.0, desc=label, bar_format=look, leave=False, ncols=columns, nrows=rows)
 
     def advance(share: float, count: int, text: str, known: bool) -> None:
-        nonlocal reached, next_line, since
+        nonlocal reached, next_line, known_time, known_share, known_count
         now, reached = clock(), max(share, reached)
-        since = (now, reached, count) if known else since
-        seconds, gain, steps = now - since[0], reached - since[1], count - since[2]
-        text += f", {60.0 * steps / seconds:,.1f} a minute" if steps and seconds else ""
+        if known:
+            known_time, known_share, known_count = now, reached, count
+        seconds, gain, steps = now - known_time, reached - known_share, count - known_count
+        if steps and seconds:
+            text += f", {60.0 * steps / seconds:,.1f} a minute"
         if share < reached:  # after a peak the load may fall for good
             text = f"falls to {share:.0%}, {text}"
         elif gain:  # first, since a narrow terminal shows the beginning

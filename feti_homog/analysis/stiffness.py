@@ -17,15 +17,17 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     bonds, starts = context.bonds(None), context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, errors, responses = context.unit_states(bonds, starts)
-    document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, errors_of_minus = dict(zip(context.loads.names, responses, strict=True)), errors[:0]
+    stiffness = columns.pop("stiffness")
+    document: dict[str, Any] = {"effective_stiffness": stiffness} | columns
+    under = dict(zip(context.loads.names, responses, strict=True))
     if one_sided:
         minus, errors_of_minus, under_minus = context.unit_states(bonds, starts, -1.0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
         under |= {f"-{name}": response for name, response in zip(context.loads.names, under_minus, strict=True)}
     else:
-        context.checks.require("L^ef", {"symmetry": averaging.asymmetry(document["effective_stiffness"])})
+        errors_of_minus = []
+        context.checks.require("L^ef", {"symmetry": averaging.asymmetry(stiffness)})
     if context.case.interface is not None:
         from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
 

@@ -36,7 +36,7 @@ def check_to_draw(directory: Path) -> str:
     A folder without result.json and checkpoint needs result.h5.  Returns the status of an unfinished path, else "".
     Raises CaseError if a needed file is missing, or a file is damaged, or from another program or run.
     """
-    # Also true for a circular link.
+    # `lexists` is also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
         return str(read(directory).get("unfinished", ""))
     field_guard.require_own(directory / field_file.NAME)
@@ -50,8 +50,10 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
     """
     path = directory / checkpoints.FOLDER / checkpoints.NAME
     if path.parent.is_dir():
+        content = b""
         try:
-            content = next(checkpoints.records(path), (0, b""))[1] if path.is_file() else b""
+            if path.is_file():
+                _, content = next(checkpoints.records(path), (0, b""))
         except CaseError as error:
             raise CaseError(f"--resume: {error}") from error
         signature, _, opening = content.decode().partition("\n")
@@ -61,7 +63,8 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
         return False
     if not (directory / result_json.NAME).is_file():
         return False
-    result = _restored(directory, document := result_json.read(directory))
+    document = result_json.read(directory)
+    result = _restored(directory, document)
     if result.digest != case.digest():
         _refuse_other(f"{directory} holds the result", document, case, result.solver.ranks)
     if case.output.fields:
@@ -75,16 +78,20 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
     """Raise CaseError with the text `start` and the keys or ranks that differ from `stored`, except in `skipped`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
-    before, now = (
-        {path: value for path, value in toml_files.leaves(document | {"ranks": count})
-         if path[0] not in ("name", "petsc", skipped) and path not in idle}
-        for document, count in ((stored["case"], stored["solver"]["ranks"]), (case.resolved(), ranks))
-    )  # fmt: skip
-    pairs = {path: (before.get(path, "none"), now.get(path, "none")) for path in now | before}
-    lines = [f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}"
-             for path, (old, new) in pairs.items() if old != new]  # fmt: skip
-    if (old := stored["solver"]["ranks"]) != ranks and len(lines) == 1:
-        raise CaseError(f"--resume: {start} of a run on {old} ranks; go on with as many, or choose another folder")
+    ignored, n_before = ("name", "petsc", skipped), stored["solver"]["ranks"]
+
+    def compared(document: Mapping[str, Any], count: int) -> dict[tuple[str, ...], Any]:
+        leaves = toml_files.leaves({**document, "ranks": count})
+        return {path: value for path, value in leaves if path[0] not in ignored and path not in idle}
+
+    before, now = compared(stored["case"], n_before), compared(case.resolved(), ranks)
+    lines = []
+    for path in now | before:
+        old, new = before.get(path, "none"), now.get(path, "none")
+        if old != new:
+            lines.append(f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}")
+    if n_before != ranks and len(lines) == 1:
+        raise CaseError(f"--resume: {start} of a run on {n_before} ranks; go on with as many, or choose another folder")
     where = f", which differs in {', '.join(lines)}" if lines else ""
     raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
 

@@ -32,7 +32,8 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     has_tips = grows or cell.comm.allreduce(int(cell.debonded(None).sum())) > 0
     if not has_tips or not cell.solver.jump_operator.global_rows:
         return law
-    inverses = [inverse for problem in cell.problems if (inverse := problem.solver.exact_inverse) is not None]
+    exact_inverses = [problem.solver.exact_inverse for problem in cell.problems]
+    inverses = [inverse for inverse in exact_inverses if inverse is not None]
     if len(inverses) < len(cell.problems):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
     return energy.ReleasedEnergy.of(law, *inverses)
@@ -49,18 +50,18 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
             zones = [*zip(context.loads.problems, context.tip_zones, strict=True)]
             loaded = [(problem, zone) for problem, zone in zones if load.lstrip("-") in problem.loads] or zones
             pairs = zip(loaded, parts, strict=False)
-            at = [zone.release(part, problem.interface) for (problem, zone), part in pairs]
-            rates.append((replace(at[0], modes=np.sum([part.modes for part in at], axis=0)), load))
+            by_problem = [zone.release(part, problem.interface) for (problem, zone), part in pairs]
+            modes = np.sum([rate.modes for rate in by_problem], axis=0)
+            rates.append((replace(by_problem[0], modes=modes), load))
     names = ("fibre", "interface", "angle", "G", "G_I", "G_II", "G_III", "psi", "length")
-    columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in rates]
+    columns = [(r.fibre, r.pair, r.direction, r.total, *r.modes.T, r.mode_angle, r.length) for r, _ in rates]
     arrays = map(np.concatenate, zip(*columns, strict=True)) if rates else [np.zeros(0)] * len(names)
     table: dict[str, Any] = dict(zip(names, arrays, strict=True))
-    table |= {
-        "fibre": tuple(table["fibre"].astype(int).tolist()),
-        "load": tuple(x for at, x in rates for _ in at.fibre),
-        "G_III": table["G_III"] if context.cell.axial else None,
-    }
-    return TipRates(**table | {"interface": _sections(context.cell, table["interface"])})
+    table["load"] = tuple(load for rate, load in rates for _ in rate.fibre)
+    table["fibre"] = tuple(table["fibre"].astype(int).tolist())
+    table["interface"] = _sections(context.cell, table["interface"])
+    table["G_III"] = table["G_III"] if context.cell.axial else None
+    return TipRates(**table)
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Tips:
@@ -76,15 +77,16 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     is_tip = (bonds.status == BONDED) & is_next
     node = np.flatnonzero(is_tip)
     used = point.scale * path_points.most_utilised(loaded, law, point.state)[0]
-    energy = used[node] ** 2 * law.fracture(bonds, is_tip, traction)
+    driving = used[node] ** 2 * law.fracture(bonds, is_tip, traction)
     mode = law.at(node).mode_angle(traction[node])
-    fibre, direction = cell.summary.fibre_number(loaded.nodes.fibre[node]), bond_directions(cell)[node]
-    energies = energy * np.cos(mode) ** 2, energy * np.sin(mode) ** 2
-    table = np.column_stack([fibre, direction, *energies, np.degrees(mode), loaded.nodes.pair[node]])
-    table = np.concatenate(cell.comm.allgather(table))
-    table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 5], table[:, 0]))]
-    fibre, angle, opening, shear, mode, pair = table.T
-    return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, _sections(cell, pair))
+    energies = driving * np.cos(mode) ** 2, driving * np.sin(mode) ** 2
+    fibre, pair = cell.summary.fibre_number(loaded.nodes.fibre[node]), loaded.nodes.pair[node]
+    local = np.column_stack([fibre, pair, bond_directions(cell)[node], *energies, np.degrees(mode)])
+    table = np.concatenate(cell.comm.allgather(local))
+    fibre, pair, direction, *_ = table.T
+    order = np.lexsort((np.round(direction, DIRECTION_DIGITS), pair, fibre))
+    fibre, pair, angle, opening, shear, psi = table[order].T
+    return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, psi, _sections(cell, pair))
 
 
 def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> tuple[float, float]:
@@ -118,4 +120,4 @@ def bond_directions(cell: unit_cell.TornCell) -> Float:
     normal = cell.solver.jump_operator.nodes.normal
     of_normals = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))
     direction = np.where(np.isnan(cell.directions), of_normals, cell.directions)
-    return np.asarray(direction + 360.0 * (np.round(direction, DIRECTION_DIGITS) <= -180.0))
+    return np.asarray(direction + np.where(np.round(direction, DIRECTION_DIGITS) <= -180.0, 360.0, 0.0))

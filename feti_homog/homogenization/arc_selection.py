@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -119,11 +120,13 @@ def checked(
     openings: Sequence[float | None] = case.section.openings or [None]
     for pair, (label, interface) in enumerate(interface_section.labelled(case.interfaces)):
         fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
-        for (number, arc), opening in ((arc, opening) for arc in enumerate(interface.debonded) for opening in openings):
-            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{number}]"
+        for (number, arc), opening in product(enumerate(interface.debonded), openings):
+            angle = opening if arc.angle is None else arc.angle
+            line = f"[{label}] debonded[{number}]"
             inside = debonded_arcs.debonded([arc], opening, fibres, directions, moved[pair])
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if not angle or (inside if fibre is None else inside[fibres == fibre]).any():
+                of_fibre = inside if fibre is None else inside[fibres == fibre]
+                if not angle or of_fibre.any():
                     continue
                 if fibre is not None and fibre not in fibres:
                     kind = f"between {' and '.join(interface.between)}" if interface.between else "that can debond"

@@ -86,7 +86,7 @@ class Response:
 
 
 class Homogenization:
-    """Averages over a torn cell with interfaces.
+    """Averages over a torn `cell` with interfaces.
 
     Attributes:
         law: bond law, without the energies released at tips; None without [interface].
@@ -129,15 +129,14 @@ class Homogenization:
         Raises ConvergenceError if the residual of the state is not finite, because the Krylov method broke down.
         """
         if not np.isfinite(state.solution.residual):
-            raise ConvergenceError(
-                f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
-                f"iterations (KSPConvergedReason {state.solution.reason})"
-            )
+            end = f"after {state.iterations} iterations (KSPConvergedReason {state.solution.reason})"
+            raise ConvergenceError(f"strain {state.solution.strain.tolist()}: the Krylov method broke down {end}")
         if brief and state.solution.alpha is None:
             strain, stress = state.solution.strain, self.interface.stress(state.solution)
             energy = float(stress @ strain) - self._rubbing(state)
             return self._scaled(state, scale, stress, energy, np.zeros(0), {})
-        cell, solver, state = self.cell, self.cell.solver, self.interface.completed(state)
+        cell, solver = self.cell, self.cell.solver
+        state = self.interface.completed(state)
         loads, u = state.solution.strain, solver.boundary_displacement(state.solution)
         strain = loads[: len(self.loads)]
         # <sigma>, <eps*> over bodies and voids, and <sigma:eps>.
@@ -146,21 +145,22 @@ class Homogenization:
         work += u @ solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [work]])
         means = distributed_arrays.allreduce_sum(cell.comm, sums) / cell.summary.area
-        stress, star, (energy,) = np.split(means, [len(loads), -1])
-        sides, stress = stress[len(strain) :], solver.closure.T @ stress
+        all_stresses, fluctuation, (energy,) = np.split(means, [len(loads), -1])
+        sides, stress = all_stresses[len(strain) :], solver.closure.T @ all_stresses
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status) * (coupled_interfaces.slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
         opening = distributed_arrays.allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy = float(energy) + self._stretched(state)
         rubbing = self._rubbing(state)
-        acting, scales = self.interface.scales.acting(strain, state.asked), self.interface.scales
+        scales = self.interface.scales
+        acting = scales.acting(strain, state.asked)
         largest = (self._largest(u) + scales.imposed(acting)) or 1.0
         imposed = float(scales.imposed_strain(acting).max()) or 1.0
         reuss = scales.stress_scale(acting) * imposed
-        left = np.abs(sides if sides.size else star - opening / self.cell.summary.area).max()
+        unbalanced = sides if sides.size else fluctuation - opening / self.cell.summary.area
         checks = {
-            "strain": float(left / imposed) + (0.0 if sides.size else self._strain_inside),
+            "strain": float(np.abs(unbalanced).max() / imposed) + (0.0 if sides.size else self._strain_inside),
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
         }
         if solver.jump_operator.global_rows:

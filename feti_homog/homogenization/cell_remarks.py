@@ -65,7 +65,9 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     if cell.has_own_mesh and cell.boundary == "periodic" and (torus.mesh.representative[matrix] == matrix).all():
         lines.append("[cell] the matrix reaches no side of the cell: are its phase and another exchanged?")
     if case.interface is None:
-        return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
+        if has_curve:
+            lines.append('the curve "debonded" of the mesh is bonded: there is no [interface]')
+        return tuple(lines)
     lines += soft_springs(case, radii)
     can_open = any((case.arcs, has_curve, phase_laws.has_springs(case), case.section.breaks))
     if case.cell.has_own_mesh and not can_open:
@@ -83,10 +85,8 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     pinned = np.searchsorted(torus.class_keys, submeshes.pinned_classes(torus))
     if len(pinned) == 1 and not torus.never_part[pinned[0]] and torus.meeting[pinned[0]] >= 2:
         x, y = torus.mesh.points[np.flatnonzero(torus.node_class == pinned[0])[0]] + torus.mesh.origin
-        lines.append(
-            f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
-            "on interfaces; use a finer mesh"
-        )
+        why = "it holds the cell, for all nodes of the mesh are on interfaces"
+        lines.append(f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: {why}; use a finer mesh")
     return tuple(lines)
 
 
@@ -117,31 +117,32 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 
     `bonds` is the number of bonds with teeth, 0 if unknown.
     """
-    cell, missing = case.cell, [name for name, m in case.materials.items() if laws.expansion(m) is None]
-    lines = tuple[str, ...]()
+    cell, lines = case.cell, list[str]()
+    missing = [name for name, material in case.materials.items() if laws.expansion(material) is None]
     if case.analysis.plane == voigt.GENERALIZED.name and 0 < len(missing) < len(case.materials):
         phases = ", ".join(f"[material.{wording.toml_key(phase)}]" for phase in missing)
-        lines = (f"{phases} expansion: missing; without it the cell has no thermal expansion",)
+        lines += [f"{phases} expansion: missing; without it the cell has no thermal expansion"]
     if cell.boundary != "periodic":
         bound = "an upper" if cell.boundary == "displacement" else "a lower"
         return (*lines, f'[cell] boundary = "{cell.boundary}": the result is {bound} bound of the effective one')
     if case.analysis.type == "envelope" and cell.order == 1:
-        lines += ("[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements",)
+        lines += ["[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements"]
     if cell.geometry == "random" and case.output.mesh_error and case.analysis.type not in ("load", "path", "angle"):
-        lines += ('[cell] geometry = "random": "+-" of one cell has mesh errors; its scatter: realisations in [sweep]',)
+        lines += ['[cell] geometry = "random": "+-" of one cell has mesh errors; its scatter: realisations in [sweep]']
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
         levels = getattr(law_of_sections(case.interfaces, np.zeros(0, np.int64)), "levels", ())
-        remark = f"[interface] softening_tolerance = {case.interfaces[0].softening_tolerance:g}: "
+        tolerance = f"softening_tolerance = {case.interfaces[0].softening_tolerance:g}"
         events = f", up to {(len(levels) - 1) * bonds} events" if bonds else ""
-        lines += (f"{remark}{len(levels) - 1} teeth a bond{events}",) if len(levels) else ()
-    if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
-        return lines
-    fraction = cell.matched.fibre_fraction
-    remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"
-    remark += "; distances between neighbours are the same in diameters"
-    return (*lines, remark) if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO else lines
+        if len(levels):
+            lines += [f"[interface] {tolerance}: {len(levels) - 1} teeth a bond{events}"]
+    if cell.match is not None and cell.matched is not None and cell.fibre_fraction is not None:
+        fraction = cell.matched.fibre_fraction
+        remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"
+        if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO:
+            lines += [f"{remark}; distances between neighbours are the same in diameters"]
+    return tuple(lines)
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
@@ -163,11 +164,6 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
     return lines
 
 
-def longest(ends: Float) -> float:
-    """Return the greatest length of e edges with end points `ends` (e, 2, 2); 0 without edges."""
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
-
-
 def process_zone(case: Case) -> tuple[float, float]:
     """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
@@ -182,10 +178,11 @@ def process_zone(case: Case) -> tuple[float, float]:
         if bond.toughness and bond.normal_stiffness:
             pure.append((bond.toughness, math.sqrt(2 * bond.normal_stiffness * bond.toughness)))
     pairs = [(toughness / strength**2, strength) for toughness, strength in pure if toughness and strength]
-    limit = 100.0 * min((strength for _, strength in pairs), default=math.inf)
+    if not pairs:  # also in conduction, where phases have no modulus
+        return math.inf, math.inf
+    limit = 100.0 * min(strength for _, strength in pairs)
     length, strength = min((pair for pair in pairs if pair[1] < limit), default=(math.inf, math.inf))
-    # Conductors have no modulus.
-    return min((_modulus(case, phase) for phase in case.materials if pairs), default=1.0) * length, strength
+    return min(_modulus(case, phase) for phase in case.materials) * length, strength
 
 
 def _modulus(case: Case, phase: str) -> float:
@@ -206,13 +203,18 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
     if math.isinf(length):
         return lines
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
-    ratio, resolved = length / radii.mean() if len(radii) else 1.0, RESOLVED_SOFTENING if softens else RESOLVED
-    zone, doubt = f"E' G / N^2 = {length:.3g} long", softens and not 0.01 <= ratio <= 100.0  # else perhaps wrong units
-    zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)" if doubt else ""
-    if edge / 2**case.cell.refine <= resolved * length:
-        return [f"{law}: the process zone is {zone}", *lines] if doubt else lines
-    size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
-    size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
+    ratio = length / radii.mean() if len(radii) else 1.0
+    resolved = RESOLVED_SOFTENING if softens else RESOLVED
+    zone = f"E' G / N^2 = {length:.3g} long"
+    is_doubtful = softens and not 0.01 <= ratio <= 100.0  # perhaps wrong units
+    if is_doubtful:
+        zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)"
+    longest_element = edge / 2**case.cell.refine
+    if longest_element <= resolved * length:
+        return [f"{law}: the process zone is {zone}", *lines] if is_doubtful else lines
+    size = f"elements on the interface are up to {longest_element:.3g} long"
+    if case.cell.refine:
+        size += f" after refine = {case.cell.refine}"
     if not softens:
         zone = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength:.3g}"
     limit = f"elements should be at most {'a third' if softens else 'half'} as long"
@@ -246,16 +248,13 @@ def _law_warnings(case: Case) -> list[str]:
         )
         similar = strength**2 / toughness
         if abs(stiffness / similar - 1.0) > SAME_RATIO:
-            lines.append(
-                f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: the energy of bonds whose mode "
-                f"changes depends on the path; expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness "
-                "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
-            )
+            formula = "(normal_toughness / tangential_toughness) (tangential_strength / normal_strength)^2"
+            expected = f"expected {similar * bond.normal_stiffness:.7g}, of normal_stiffness {formula}"
+            fault = "the energy of bonds whose mode changes depends on the path"
+            lines.append(f"[{section}] tangential_stiffness = {bond.tangential_stiffness:g}: {fault}; {expected}")
     bond, most = case.interfaces[0], interface_section.InterfaceSection.softening_tolerance
     if law.overshoot > most * (1.0 + SAME_RATIO):
         cause = f"softening_tolerance = {bond.softening_tolerance:g}" if bond.teeth is None else f"teeth = {bond.teeth}"
-        lines.append(
-            f"[interface] {cause}: the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the "
-            f"peak of the cell; by default at most by {most:.1%}"
-        )
+        excess = f"the first tooth exceeds the peak traction by {law.overshoot:.1%}, and so may the peak of the cell"
+        lines.append(f"[interface] {cause}: {excess}; by default at most by {most:.1%}")
     return lines

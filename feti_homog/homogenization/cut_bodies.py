@@ -42,8 +42,9 @@ class SharedVertices:
         for pieces, mesh in meshes:
             first, parts = 0, list[tuple[Int, Int, Int, Int]]()
             for s in pieces:
-                triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
-                first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
+                after = first + len(s.triangles)
+                triangle, k, nodes = border_lines(s, mesh, mesh.node_class[mesh.nodes[first:after]])
+                first, line = after, nodes[:, :: mesh.lattice.order]  # vertices
                 ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
                 back = s.backwards[triangle, k]
                 ends[back] = ends[back, ::-1]
@@ -57,7 +58,8 @@ class SharedVertices:
                 classes, index = np.unique(line, return_index=True)
                 parts.append((rows[index], classes, np.column_stack([body, entity, np.zeros_like(entity)]), line))
             borders.append([np.concatenate(table) for table in zip(*parts, strict=True)])
-        vertex_copies, edge_copies = (self._copies([border[k] for border in borders]) for k in (0, 2))
+        vertex_copies = self._copies([rows for rows, *_ in borders])
+        edge_copies = self._copies([edges for _, _, edges, _ in borders])
         self._rows = NO_ROWS
         self.meshes, self.classes, self.sides, self.is_first = list[int](), list[Int](), list[Int](), list[Bool]()
         for number, (rows, classes, _, line) in enumerate(borders):

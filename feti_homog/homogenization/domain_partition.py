@@ -8,7 +8,8 @@ import numpy as np
 from feti_homog.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import partition
-from feti_homog.homogenization import cell_remarks, partition_policy
+from feti_homog.homogenization import cell_remarks
+from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh import CoarseMesh, ReferenceLattice, SubmeshesOfRank, Torus, mesh_fibres, submeshes
 from feti_homog.mesh.fill import gmsh_mesher
 from feti_homog.mesh.tiles import tile_filling
@@ -122,11 +123,7 @@ class RankShare:
 
 
 def distribute(
-    case: Case,
-    mesh: CoarseMesh,
-    lattice: ReferenceLattice,
-    n_ranks: int,
-    policy: partition_policy.PartitionPolicy = partition_policy.DEFAULT_POLICY,
+    case: Case, mesh: CoarseMesh, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> list[RankShare]:
     """Cut the cell on one rank, and return the part of each rank.
 
@@ -146,11 +143,12 @@ def distribute(
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    bodies, across = int(parts.max()) + 1, (cut := _cut_across(case, torus, lattice, n_ranks, policy)) is not None
+    bodies, cut = int(parts.max()) + 1, _cut_across(case, torus, lattice, n_ranks, policy)
+    across = cut is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
         edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
-        pieces = partition_policy.wanted_pieces(case, halves * np.bincount(parts), edges, lattice, n_ranks, policy)
+        pieces = wanted_pieces(case, halves * np.bincount(parts), edges, lattice, n_ranks, policy)
         cut = partition.decompose(torus, parts, np.minimum(pieces, np.bincount(parts)), n_ranks)
     table, pinned = submeshes.SubdomainTable.of(torus, cut.subdomain, cut.rank, across), submeshes.pinned_classes(torus)
     radii, text = circles[is_fibre, 2], cell_remarks.subdomain_remarks(case, bodies, len(cut.rank), halves * len(parts))
@@ -186,11 +184,13 @@ def distribute(
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:
     """Summarize the tiled cell `noded`, with its numbers of subdomains and coarse `triangles`."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
-    solid = np.flatnonzero((inside := regions.constituent[:-1]) >= 0)
+    inside = regions.constituent[:-1]  # without the matrix
+    solid = np.flatnonzero(inside >= 0)
     circle = solid[np.unique(inside[solid], return_index=True)[1]]
     disc, radii = lines.disc[circle], regions.ellipses.circles[circle, 2]
     is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
+    ends = noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]
     nothing = np.full((1, 2), np.nan)
     return CellSummary(
         width=regions.width,
@@ -199,7 +199,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         bodies=len(regions.phase),
         subdomains=subdomains,
         coarse_triangles=triangles,
-        interface_edge=cell_remarks.longest(noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]),
+        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
         numbers=np.append(0, disc + 1),
         is_fibre=np.append(False, is_fibre),
         constituent_phase=regions.phase,
@@ -222,12 +222,12 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 
 
 def _cut_across(
-    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: partition_policy.PartitionPolicy
+    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> partition.Partition | None:
     """Cut the cell across materials; return None if the case, the policy or METIS prevents the cut."""
     elements, corners = torus.mesh.triangles.shape
     dofs, is_image = elements * (corners - 2) * lattice.intervals**2, corners == 4
-    pieces = policy.across_pieces(dofs, n_ranks, is_image) if partition_policy.can_be_cut_across(case) else 0
+    pieces = policy.across_pieces(dofs, n_ranks, is_image) if can_be_cut_across(case) else 0
     if not 0 < pieces <= elements:
         return None
     if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):

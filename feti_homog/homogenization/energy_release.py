@@ -129,10 +129,10 @@ class TipZones:
     def reach(self, tips: debonded_arcs.CrackTips) -> Float:
         """Return the radii (t,) of zones without other tips, and without boundaries except the circles of the tips."""
         bodies, position, spokes = self.bodies[tips.node], self.points[tips.node], self.spokes[tips.node]
-        radius, (points, body), period = np.linalg.norm(spokes, axis=1), self._boundaries, self.period
-        reach, wrapped = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), in_cell(position, period)
+        (points, body), period = self._boundaries, self.period
+        radius, wrapped = np.linalg.norm(spokes, axis=1), in_cell(position, period)
         nearest, _ = cKDTree(wrapped, boxsize=period).query(wrapped, 2)  # infinite for a single tip
-        reach = np.minimum(reach, nearest[:, 1])
+        reach = np.minimum(np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min()), nearest[:, 1])
         inside = cKDTree(in_cell(points, period), boxsize=period).query_ball_point(wrapped, reach)
         for t, nodes in enumerate(inside):
             offset = nearest_image(points[nodes] - position[t], period)
@@ -166,7 +166,7 @@ class TipZones:
     def energy_changes(
         self, tips: debonded_arcs.CrackTips, reach: Float, responses: Sequence[Response], grows: bool = False
     ) -> Float:
-        """Differentiate twice the energies (t, k, k) by the turn or the growth of the mesh at each tip.  Collective.
+        """Return derivatives (t, k, k) of twice the energies by the turn or growth of each tip's mesh.  Collective.
 
         If the mesh `grows`, distances from the tip grow, along the circle and across it.  Nodes beyond `reach` rest.
         """
@@ -196,7 +196,8 @@ class TipZones:
         rate = q * (np.log(np.where(q > 0.0, place / unit, 1.0)) if grows else 1j)
         moved = np.stack([(rate * place).real, (rate * place).imag], axis=2)
         H = np.stack([problem.gradient(load) for load in loads[: problem.strains].T], axis=2)
-        total = u.reshape(-1, *H.shape[::2])[part.mesh.node_class[nodes]] + np.einsum("ead,cdk->eack", offset, H)
+        fluctuation = u.reshape(-1, problem.components, u.shape[1])[part.mesh.node_class[nodes]]
+        total = fluctuation + np.einsum("ead,cdk->eack", offset, H)
         changed = rate.imag[..., None, None] * (QUARTER_TURN @ total) if problem.turns else None
         fields = shape_functions.ElementFields.of(problem, points, total, part.L, np.zeros(1), part.is_mixed)
         return fields.change(part.L, loads[problem.strains :], moved, changed)
@@ -261,13 +262,9 @@ class TipZones:
             # The first debonded nodes behind the tip, and the first bonded nodes ahead.
             behind = behind[: np.argmin(np.append(debonded, False))]
             front = front[: np.argmin(np.append(bonded, False))]
-            to_behind, to_front = (
-                np.linalg.norm(
-                    nearest_image(self.points[chain] - self.points[tips.node[t]], self.period),
-                    axis=1,
-                )
-                for chain in (behind, front)
-            )
+            tip = self.points[tips.node[t]]
+            to_behind = np.linalg.norm(nearest_image(self.points[behind] - tip, self.period), axis=1)
+            to_front = np.linalg.norm(nearest_image(self.points[front] - tip, self.period), axis=1)
             length[t] = max(least[t], to_behind[min(order, len(behind) - 1)])
             work[t] = debonded_arcs.closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length

@@ -83,7 +83,7 @@ def energy_errors(
     nested: bool | None = None,
     zones: TipZones | None = None,
 ) -> EnergyErrors:
-    """Estimate the mesh errors of k responses in one problem.  Collective.
+    """Estimate the mesh errors of k responses in one problem, with the same intact bonds.  Collective.
 
     Args:
         contact: whether faces touch.
@@ -114,8 +114,8 @@ def energy_errors(
     if cell.case.interfaces and not cell.summary.across:
         lam = np.stack([response.solution.lam for response in responses], axis=1)
         state = responses[0].state
-        springs = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
-        elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
+        beyond_tips, along_sides = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
+        elements, arcs = elements + beyond_tips / area, arcs + along_sides / area
     is_uneven = cell.summary.has_corners or (lattice.order == 2 and bool(cell.case.interfaces))
     smallest = LEAST_SHARE if is_uneven else LEAST_OF_TWO[lattice.order]
     # If faces touch at different positions in two responses, the energy is not bilinear: nothing cancels.
@@ -137,9 +137,8 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
 
     Errors fall more slowly at corners and tips.  The result is false without a coarser lattice, with straight sides at
     voids, with fibres other than circles and ellipses, for linear elements without interfaces, and for quadratic
-    elements with a phase that locks.  For debonded
-    responses it is true only if elements are linear and the mesh is graded to tips: a generated mesh, without
-    `tip_size`, for an analysis in which no bonds break.
+    elements with a phase that locks.  For debonded responses it is true only if elements are linear and the mesh is
+    graded to tips: a generated mesh, without `tip_size`, for an analysis in which no bonds break.
     """
     lattice, case = cell.lattice, cell.case
     pieces = (s.submesh for s in cell.subdomains)
@@ -164,7 +163,7 @@ def _recovered(
     displacements at the coarse nodes instead; the estimates are hardly smaller.
     """
     u = np.stack([response.u for response in responses], axis=1)
-    loads, v = np.stack([response.all_loads for response in responses], axis=1), len(responses[0].strain)
+    loads = np.stack([response.all_loads for response in responses], axis=1)
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
     solved = list[tuple[list[Subdomain] | list[UniformPart], FineMesh, Float, Int]]()
@@ -176,7 +175,8 @@ def _recovered(
             solved.append((interior.members, interior.mesh, displacement, position))
     else:
         inside = np.stack([response.inside for response in with_displacements(cell, responses)], axis=1)
-        numbered, position = np.arange(len(inside)) if across else boundary.local_dofs, np.full(len(inside), NONE)
+        numbered = np.arange(len(inside)) if across else boundary.local_dofs
+        position = np.full(len(inside), NONE)
         position[numbered] = np.arange(len(numbered))
         for group in groups(cell.parts, lattice):
             parts, rows = [cell.parts[k] for k in group], slice(cell.offsets[group[0]], cell.offsets[group[-1] + 1])
@@ -188,13 +188,14 @@ def _recovered(
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
     for members, mesh, displacement, position in solved:
         first, pieces = members[0], [s.submesh for s in members]
-        E, mixed = loads[:v], first.is_mixed
-        stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, E, mixed)
+        E = loads[: len(responses[0].strain)]
+        stress = stress_recovery.RecoveredStress.on(mesh, first.L, first.problem, displacement, E, first.is_mixed)
         sides = arc_error.ArcSides.of(stress, pieces, lattice)
         groups_of_rank.append(Group(stress, sides, position[:: first.problem.components]))
         meshes.append((pieces, mesh))
-    body, shared, fits = cell.table.body, None, dict[int, tuple[Int, Float]]()
-    if (len(body) > 1) if across else (np.bincount(body) > 1).any():
+    shared, fits = None, dict[int, tuple[Int, Float]]()
+    pieces_of_body = [len(cell.table.body)] if across else np.bincount(cell.table.body)
+    if np.max(pieces_of_body) > 1:
         from feti_homog.homogenization.cut_bodies import SharedVertices, fits_across_cuts  # most bodies are not cut
 
         shared = SharedVertices(cell.comm, meshes)
@@ -203,7 +204,7 @@ def _recovered(
     if lattice.order == 1:
         tractions = boundary_tractions(cell, responses, groups_of_rank, shared, is_nested)
     for number in range(len(groups_of_rank)):
-        stress, sides, _ = groups_of_rank.pop(0)
+        stress, sides, _ = groups_of_rank.pop(0)  # to free its arrays after use
         yield replace(stress, known=tractions.get(number), shared=fits.get(number)), sides
 
 
@@ -242,9 +243,10 @@ def boundary_tractions(
             sums[number][classes] = total
     by_group = dict[int, local_fits.KnownTractions]()
     for number, ((stress, _, position), table) in enumerate(zip(groups, sums, strict=True)):
-        selected = np.flatnonzero((table[:, 3] == 2) | (table[:, 4] > 0))
+        ends_here, void_ends = table[:, 3:].T
+        selected = np.flatnonzero((ends_here == 2) | (void_ends > 0))
         if len(selected):
-            areas, size, is_free = table[selected, :2], table[selected, 2], table[selected, 4] > 0
+            areas, size, is_free = table[selected, :2], table[selected, 2], void_ends[selected] > 0
             traction = forces[np.maximum(position[selected], 0)[:, None] + np.arange(stress.problem.components)]
             traction[is_free] = 0.0
             length = of_node[position[selected]] if nested else np.hypot(*areas.T)

@@ -183,19 +183,19 @@ def memory(
         columns: multipliers that have influence columns.
     """
     dofs = sum(components) * max(nodes)
-    of_interiors, of_cells = keeps_interiors(case) * dofs * INTERIOR_BYTES, max(components) * max(nodes) * FACTOR_BYTES
-    factors = of_cells if max(subdomains) == 1 else of_interiors
+    of_interiors = dofs * INTERIOR_BYTES if keeps_interiors(case) else 0.0
+    factors = max(components) * max(nodes) * FACTOR_BYTES if max(subdomains) == 1 else of_interiors
     return BASE_BYTES + dofs * DOF_BYTES + factors + columns / len(nodes) * COLUMN_BYTES
 
 
-def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
+def memory_to_the_end(case: Case, before: float, multipliers: int, columns: int, ranks: int) -> float:
     """Estimate the memory of the largest rank after all bonds break, in bytes.
 
-    `few` is this memory before bonds break; `columns` of all `multipliers` have influence columns.
+    `before` is this memory before bonds break; `columns` of all `multipliers` have influence columns.
     """
     stored = columns if columns <= thresholds.NEVER_REFACTORED_ROWS else thresholds.INFLUENCE_COLUMNS
     faces = PAIR_BYTES * multipliers**2 if case.has_friction else 0
-    return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
+    return before + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:

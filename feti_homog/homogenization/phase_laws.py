@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.case import Case, bond_laws, cell_sizes
+from feti_homog.case import Case, bond_laws
 from feti_homog.fem import AXIAL, CONDUCTION, GENERALIZED, PLANE, Problem
 from feti_homog.feti.decomposition import jump_operator
 from feti_homog.materials import laws, voigt
@@ -50,11 +50,6 @@ def law(case: Case, phase: str, problem: Problem) -> Float:
     return np.asarray(N.T @ C @ N)
 
 
-def is_mixed(case: Case, phase: str) -> bool:
-    """Return whether a phase's elements have a bubble and a pressure in the plane problem."""
-    return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
-
-
 def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tuple[Float, ...]:
     """Differentiate `law` in each of the `problems`: one or two derivatives (v, v).
 
@@ -63,16 +58,16 @@ def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tupl
     problem = problems(case)[0]
     if problem in (PLANE, CONDUCTION):
         return (dC,)
-    axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
+    axial, in_plane = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
     material = case.material_of(phase)
     alpha = laws.expansion(material)
     if problem != GENERALIZED or alpha is None:
-        return dC, axial
+        return in_plane, axial
     C = laws.spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
     N, dN = np.column_stack([np.eye(4), -alpha[IN_PLANE]]), np.zeros((4, 5))
     dN[:, 4] = -expansion[IN_PLANE]
     mixed = N.T @ C @ dN
-    return N.T @ dC @ N + mixed + mixed.T, axial
+    return N.T @ in_plane @ N + mixed + mixed.T, axial
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:
@@ -83,9 +78,11 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
     """
     if not axial:
         return {"stiffness": plane}
-    C, block = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
-    C[block], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
-    return {"stiffness": C} | ({"thermal_stress": spatial_vector(plane[:, 4], None)} if len(plane) > 4 else {})
+    C = np.zeros((6, 6))
+    C[np.ix_(IN_PLANE, IN_PLANE)] = plane[:4, :4]
+    C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = axial[0]
+    heat = {"thermal_stress": spatial_vector(plane[:, 4], None)} if len(plane) > 4 else {}
+    return {"stiffness": C} | heat
 
 
 def components(plane: Float, *axial: Float) -> Float:
@@ -131,7 +128,8 @@ def strength_factors(case: Case, fibres: int) -> Float:
     A ratio is (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution with modulus m and mean 1),
     times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th number of the generator.
     """
-    factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
+    factors = np.ones(fibres)
+    scatter = case.interface.scatter if case.interface else None
     if scatter is not None:
         # A separate random stream, because the arrangement takes other numbers from the same seed.
         uniform = np.random.default_rng(np.random.SeedSequence(scatter.seed, spawn_key=(1,))).random(fibres)

@@ -64,8 +64,8 @@ def with_displacements(cell: TornCell, responses: Sequence[Response]) -> list[Re
     """Return the responses with u* inside the subdomains.  Collective."""
     if all(len(response.inside) == cell.offsets[-1] for response in responses):
         return list(responses)
-    u, loads = (np.stack([getattr(response, name) for response in responses], axis=1) for name in ("u", "all_loads"))
-    columns = cell.extended(u, loads).T
+    u = np.stack([response.u for response in responses], axis=1)
+    columns = cell.extended(u, np.stack([response.all_loads for response in responses], axis=1)).T
     return [replace(response, inside=column) for response, column in zip(responses, columns, strict=True)]
 
 
@@ -74,6 +74,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
 
     `states` has the responses of each problem in each state; a problem without a response has zero fields.
     """
+    # Conduction has its responses in the place of the axial problem.
     by_problem = [*zip((cell, cell.axial or cell), zip(*states, strict=True), strict=False)]
     u = [np.zeros((torn.offsets[-1], len(states))) for torn, _ in by_problem]
     passes = [_stresses(*pair, out) for pair, out in zip(by_problem, u, strict=True) if any(pair[1])]
@@ -87,7 +88,8 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
         stress, without_noise = sum(stresses for *_, stresses in chunks)
         weights = chunk.weights / chunk.weights.sum(axis=1, keepdims=True)
         last = first + len(weights)
-        means[:, components, first:last], first = (stress[:, components] * weights).sum(axis=-1), last
+        means[:, components, first:last] = (stress[:, components] * weights).sum(axis=-1)
+        first = last
         if not is_scalar and not np.isnan(without_noise).any():
             places = in_cell(chunk.points.reshape(-1, 2), cell.summary.shift)[:, None]
             for largest, tensors in zip(by_phase, without_noise.reshape(*stress.shape[:2], -1), strict=True):
@@ -118,8 +120,8 @@ def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]
     masks = [s.state.status == Contact.BONDED for s in states if rigid.any() and s is not None and s.debonded]
     if masks:
         length, inner = FibreInterfaces(cell).length, cell.summary.is_fibre[nodes.fibre]
-        sides = [rigid[nodes.pair] & on for on in (inner, ~inner)]  # a coated fibre may have two interfaces
-        if any(np.minimum(length(bonded & on), length(~bonded & on)).any() for bonded in masks for on in sides):
+        sides = [rigid[nodes.pair] & side for side in (inner, ~inner)]  # a coated fibre may have two interfaces
+        if any(np.minimum(length(bonded & side), length(~bonded & side)).any() for bonded in masks for side in sides):
             places.add("tips of debonding")
     return places
 
@@ -132,14 +134,14 @@ def _stresses(
     Writes u* to `out` (dofs, s).  The stresses at the q points come as computed, then with 0 in place of rounding
     errors; they are 0 in states without a response.
     """
-    at = [number for number, response in enumerate(responses) if response is not None]
+    columns = [number for number, response in enumerate(responses) if response is not None]
     present = with_displacements(cell, [response for response in responses if response is not None])
-    out[:, at] = np.stack([response.inside for response in present], axis=1)
+    out[:, columns] = np.stack([response.inside for response in present], axis=1)
     loads = np.stack([response.all_loads for response in present], axis=1)[: len(cell.solver.problem.loads)]
-    for part, displacement in cell.by_part(out[:, at]):
+    for part, displacement in cell.by_part(out[:, columns]):
         L, problem, m = part.L, part.problem, part.problem.strains
         # The stresses in space follow from the stresses conjugate to strains of displacements.
-        rows, constants = np.zeros((6, m)), np.zeros((6, len(at)))
+        rows, constants = np.zeros((6, m)), np.zeros((6, len(columns)))
         rows[voigt.IN_PLANE if problem.turns else phase_laws.AXIAL_SHEAR] = np.eye(m)
         if len(loads) > m:  # S33 is conjugate to the load E33
             rows[2] = np.linalg.solve(L[:m, :m], L[:m, m])
@@ -147,12 +149,12 @@ def _stresses(
         elif problem.turns:
             rows[2] = laws.out_of_plane(cell.case.material_of(part.submesh.phase), cell.case.analysis.plane)[0]
         noise = ROUNDING * (np.abs(L) @ np.abs(loads))[: problem.stresses].max(axis=0)[:, None, None]
-        u_of_part = displacement.reshape(-1, problem.components, len(at))
+        u_of_part = displacement.reshape(-1, problem.components, len(columns))
         recovery = stress_recovery.RecoveredStress.on(part.mesh, L, problem, u_of_part, loads, part.is_mixed)
         for chunk in recovery.elements:
-            stress = rows @ chunk.stress.reshape(-1, m, len(at)).transpose(2, 1, 0) + constants.T[:, :, None]
+            stress = rows @ chunk.stress.reshape(-1, m, len(columns)).transpose(2, 1, 0) + constants.T[:, :, None]
             everywhere = np.zeros((2, len(responses), *stress.shape[1:]))  # also in states without a response
-            everywhere[:, at] = stress, np.where(np.abs(stress) < noise, 0.0, stress)
+            everywhere[:, columns] = stress, np.where(np.abs(stress) < noise, 0.0, stress)
             yield part.submesh.phase, chunk, everywhere.reshape(*everywhere.shape[:3], *chunk.weights.shape)
 
 

@@ -34,14 +34,16 @@ class SpringSides:
         self._chains = debonded_arcs.InterfaceChains(neighbours.adjacency)
         rows = jumps.nodes.bodies[:, 1], jumps.nodes.points, jumps.nodes.normal
         fibre, self._points, self._normal = (np.concatenate(a) for a in zip(*self._comm.allgather(rows), strict=True))
-        number, first, fibre = neighbours.node_numbers(jumps), 0, np.append(fibre, -1)
+        fibre = np.append(fibre, -1)  # a class that is no interface node has the number -1
+        number, first = neighbours.node_numbers(jumps), 0
         # The nodes (order + 1,) of each side, the normals (q, 2) at Gauss points, whose length is the arc length per
         # unit of the arc parameter, and the turn.
         starts = np.arange(0, lattice.intervals, lattice.order)
         sides = [(np.zeros((0, lattice.order + 1), np.int64), np.zeros((0, len(POINTS), 2)), np.zeros(0))]
         for part in parts:
             triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
-            nodes, first = number[first : first + part.mesh.n_classes][line], first + part.mesh.n_classes
+            nodes = number[first : first + part.mesh.n_classes][line]
+            first += part.mesh.n_classes
             inner = (fibre[nodes] == part.submesh.constituent[triangle, None]).all(axis=1)
             inner[inner] = (neighbours.near[nodes[inner, 0]] == nodes[inner, 1, None]).any(axis=1)  # not along a cut
             normal, turn = shared_entities.edge_normals(part.submesh, triangle[inner], k[inner])

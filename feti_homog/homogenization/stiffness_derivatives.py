@@ -14,7 +14,7 @@ energy on a moving mesh with fixed nodal u - E x.  This is exact for the mesh, h
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,22 +72,18 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
         springs.append(distributed_arrays.allreduce_sum(cell.comm, work))
     for number, bond in enumerate(case.interfaces):
         label = f"interface.{number + 1}" if len(case.interfaces) > 1 else "interface"
-        # The problems and components of the springs that have a stiffness.
-        springs_of_keys = {"normal_stiffness": [(0, 0)], "tangential_stiffness": [(0, 1)], "axial_stiffness": [(1, 0)]}
+        # The components, in each problem, of the springs that have a stiffness.
+        axial = [0] if bond.axial_stiffness is None else []  # by default axial springs have the tangential stiffness
+        places = {"normal_stiffness": [[0], []], "tangential_stiffness": [[1], axial], "axial_stiffness": [[], [0]]}
         if cells[0].solver.problem == CONDUCTION:
-            springs_of_keys = {"conductance": [(0, 0)]}
-        elif bond.axial_stiffness is None:
-            springs_of_keys["tangential_stiffness"].append((1, 0))
-        for key, pairs_of_key in springs_of_keys.items():
+            places = {"conductance": [[0]]}
+        for key, components in places.items():
             value = getattr(bond, key)
             if value is not None and np.isfinite(value):
-                energies = tuple(
-                    sum((work[number, i] for p, i in pairs_of_key if p == problem), np.zeros(work.shape[2:]))
-                    / (value * area)
-                    for problem, work in enumerate(springs)
-                )
-                changes.append(Derivative(f"{label}.{key}", value, energies))
-    for f in _fractions(case):
+                works = [work[number, c].sum(axis=0, initial=0.0) for work, c in zip(springs, components, strict=False)]
+                changes.append(Derivative(f"{label}.{key}", value, tuple(work / (value * area) for work in works)))
+    f = _growing_fraction(case)
+    if f is not None:
         changes.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
     return changes
 
@@ -96,7 +92,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     """Integrate the strain products and the energy change with fibre growth.  Collective.
 
     Return int e_i (x) e_j (v, k, v, k) by material for k unit loads, and the derivatives (k, k) of |UC| C with respect
-    to ln R of all fibres, which are 0 unless the case has a fraction in `_fractions`.
+    to ln R of all fibres, which are 0 without a `_growing_fraction`.
     """
     problem = cell.solver.problem
     loads = np.stack([response.all_loads for response in responses], axis=1)[: len(problem.loads)]
@@ -104,20 +100,21 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     m, (v, k) = problem.strains, loads.shape
     # T maps [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
     T = np.zeros((m * k + 1, v * k))
-    T[: m * k, : m * k], T[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
+    T[: m * k, : m * k] = np.eye(m * k)
+    T[-1, m * k :] = loads[m:].ravel()
     materials = dict.fromkeys(material_sections.provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
-    grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for s, displacement in cell.by_part(inside):
-        u = displacement.reshape(-1, problem.components, k)
-        V = _velocity(s.mesh.points, cell.summary) if grows else None
-        for first in range(0, len(s.mesh.triangles), assembly.ELEMENTS_AT_ONCE):
-            nodes = s.mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
-            of_nodes = s.mesh.points[nodes], u[s.mesh.node_class[nodes]]
-            fields = shape_functions.ElementFields.of(problem, *of_nodes, s.L, loads[:m], s.is_mixed)
-            sums[material_sections.provider(s.submesh.phase, cell.case.materials)] += _products(fields)
+    growth = np.zeros((k, k))
+    for part, displacement in cell.by_part(inside):
+        mesh, u = part.mesh, displacement.reshape(-1, problem.components, k)
+        V = None if _growing_fraction(cell.case) is None else _velocity(mesh.points, cell.summary)
+        for first in range(0, len(mesh.triangles), assembly.ELEMENTS_AT_ONCE):
+            nodes = mesh.triangles[first : first + assembly.ELEMENTS_AT_ONCE]
+            of_nodes = mesh.points[nodes], u[mesh.node_class[nodes]]
+            fields = shape_functions.ElementFields.of(problem, *of_nodes, part.L, loads[:m], part.is_mixed)
+            sums[material_sections.provider(part.submesh.phase, cell.case.materials)] += _products(fields)
             if V is not None:
-                growth += fields.change(s.L, loads[m:], V[nodes])
+                growth += fields.change(part.L, loads[m:], V[nodes])
     grams = {
         name: (T.T @ distributed_arrays.allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k)
         for name, gram in sums.items()
@@ -142,12 +139,11 @@ def _gram(fields: Float, weights: Float) -> Float:
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 
 
-def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fibre fraction if the cell is a lattice of equal, uncoated, bonded fibres; else nothing."""
+def _growing_fraction(case: Case) -> float | None:
+    """Return the fibre fraction if the cell is a lattice of equal, uncoated, bonded fibres; else None."""
     cell = case.cell
     is_bare = cell.geometry in cell_section.LATTICES and cell.coating is None and not case.interfaces
-    if is_bare and cell.fibre_fraction is not None:
-        yield cell.fibre_fraction
+    return cell.fibre_fraction if is_bare else None
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:

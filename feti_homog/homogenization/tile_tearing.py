@@ -23,10 +23,10 @@ from feti_homog.mesh.fill import element_estimate, gmsh_mesher
 from feti_homog.mesh.outline import graded_size, lines
 from feti_homog.mesh.tiles import tile_filling, tiling
 from feti_homog.system.parallel import distributed_arrays, mpi_errors
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float, Int, Intracomm
 
 
-def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
+def cut(case: Case, lattice: ReferenceLattice, comm: Intracomm, policy: PartitionPolicy) -> RankShare:
     """Mesh and cut the cell, and return this rank's part.  Collective; raises CaseError, MeshError on every rank."""
     noded = place_nodes(case, comm, policy.tiles)
     if mpi_errors.on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
@@ -37,9 +37,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
     return distributed_arrays.scatter(comm, shares or [])
 
 
-def place_nodes(
-    case: Case, comm: MPI.Intracomm, policy: tiling.TilePolicy
-) -> gmsh_mesher.NodedCell | CoarseMesh | None:
+def place_nodes(case: Case, comm: Intracomm, policy: tiling.TilePolicy) -> gmsh_mesher.NodedCell | CoarseMesh | None:
     """Place nodes on the lines of the cell.  Collective.
 
     Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.  Raises CaseError and MeshError
@@ -53,11 +51,7 @@ def place_nodes(
     field: graded_size.SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
     lines = distributed_arrays.scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
     stations = distributed_arrays.gather(comm, mpi_errors.agree(comm, lines.stations, field))
-
-    def with_nodes(unmeshed: gmsh_mesher.UnmeshedCell) -> gmsh_mesher.NodedCell:
-        return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
-
-    return mpi_errors.on_root_only(comm, with_nodes, unmeshed)
+    return mpi_errors.on_root_only(comm, lambda cell: cell.with_nodes(cell.bare.lines.joined(stations)), unmeshed)
 
 
 def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCell | CoarseMesh:
@@ -86,7 +80,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
     return cell
 
 
-def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: Intracomm) -> CoarseMesh | None:
     """Fill the tiles on all ranks, and join the mesh on rank 0; None on others.  Collective.
 
     Raises MeshError on every rank if a rank cannot fill a tile.
@@ -102,7 +96,7 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: MPI.Intrac
 
 
 def filled_tiles(
-    tiles: Sequence[tile_filling.Tile], comm: MPI.Intracomm
+    tiles: Sequence[tile_filling.Tile], comm: Intracomm
 ) -> list[tuple[int, tile_filling.Tile, tile_filling.Filling]]:
     """Deal the `tiles` of rank 0 to all ranks, and fill them; return this rank's with their numbers.  Collective.
 
@@ -132,11 +126,7 @@ def can_be_torn_by_tiles(
 
 
 def tear_by_tiles(
-    case: Case,
-    noded: gmsh_mesher.NodedCell | None,
-    lattice: ReferenceLattice,
-    comm: MPI.Intracomm,
-    policy: PartitionPolicy,
+    case: Case, noded: gmsh_mesher.NodedCell | None, lattice: ReferenceLattice, comm: Intracomm, policy: PartitionPolicy
 ) -> RankShare:
     """Tear a cell by its tiles, and return this rank's part.  Collective.
 
@@ -144,10 +134,10 @@ def tear_by_tiles(
     """
     phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
-    own = filled_tiles(() if noded is None else noded.parts, comm)
-    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in own])))
+    of_rank = filled_tiles(() if noded is None else noded.parts, comm)
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in of_rank])))
     ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
-    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for k, tile, filling in own]
+    filled = [tiling.FilledTile(k, tile, filling, int(ends[k])) for k, tile, filling in of_rank]
     torus, tile = mpi_errors.agree(comm, tiling.tile_torus, regions, filled, int(ends[-1]))
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
@@ -160,7 +150,8 @@ def tear_by_tiles(
     body, tiles, loads = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     order = np.lexsort((np.arange(len(body)), tiles, body))
     before = sum(len(bodies) for bodies, *_ in parts[: comm.rank])
-    subdomain, body, loads = np.argsort(order)[before + local], body[order], loads[order]
+    subdomain = np.argsort(order)[before + local]
+    body, loads = body[order], loads[order]
     neighbours = comm.gather(mpi_errors.agree(comm, _neighbours, torus, subdomain))
     rank = mpi_errors.on_root(comm, _assigned, loads, neighbours or [], comm.size)
     table = submeshes.SubdomainTable(body, rank, nesting, regions.phase)
@@ -169,7 +160,8 @@ def tear_by_tiles(
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
     candidates = comm.allgather(submeshes.pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
-    pinned = np.array(min(chain.from_iterable(candidates))[-1:])
+    _, _, key = min(chain.from_iterable(candidates))
+    pinned = np.array([key])
     shares = mpi_errors.agree(comm, lambda: list(submeshes.cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = mpi_errors.on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))

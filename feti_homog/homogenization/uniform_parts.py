@@ -80,8 +80,8 @@ def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
     """Return the mesh of the coarse triangles `members` (t,), and the original numbers (c,) of its classes."""
     nodes, local = periodic_topology.present(mesh.nodes[members], len(mesh.points))
     classes, node_class = periodic_topology.present(mesh.node_class[nodes], mesh.n_classes)
-    numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
-    return FineMesh(mesh.points[nodes], numbers[0], curved, numbers[1], len(classes), mesh.lattice), classes
+    triangles, numbers = local.astype(np.int32), node_class.astype(np.int32)
+    return FineMesh(mesh.points[nodes], triangles, mesh.curved[members], numbers, len(classes), mesh.lattice), classes
 
 
 def share_parts(
@@ -108,13 +108,13 @@ class ForcesBetweenParts:
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble stiffness K and load forces Q of the coarse triangles at shared nodes.  Collective."""
         self._jumps, problem = jumps, jumps.problem
-        torn, nodes = refinement.joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
+        torn = refinement.joined([p.mesh for p in parts])
         is_shared = np.zeros(torn.n_classes, bool)
-        is_shared[nodes] = True
+        is_shared[problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))] = True
         touching = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
         mesh, classes = _restricted(torn, touching)
-        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
-        used, material = np.unique(law, return_inverse=True)
+        part_of = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
+        used, material = np.unique(part_of, return_inverse=True)
         mixed = tuple(parts[k].is_mixed for k in used)
         body = assembly.assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
         sides = np.concatenate([assembly.side_loads(p.submesh, p.mesh, problem) for p in parts])
@@ -155,7 +155,8 @@ class NestedInterior:
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # NONE takes the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
-        all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
+        all_dofs[self.fixed] = on_boundary
+        all_dofs[self.interior.dofs] = self.interior.extend(on_boundary)
         if self.loads is not None:
             all_dofs[self.interior.dofs] -= self.interior.solve(self.loads @ loads)
         return all_dofs.reshape(-1, problem.components, u.shape[1])
@@ -174,7 +175,8 @@ def nested_interiors(
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
-        first, meshes, numbers = members[0], [refinement.refine(s.submesh, coarser) for s in members], list[Int]()
+        meshes = [refinement.refine(s.submesh, coarser) for s in members]
+        first, numbers = members[0], list[Int]()
         for k, s, mesh in zip(group, members, meshes, strict=True):
             of_fine = np.full(s.n_dofs, inside)
             of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))

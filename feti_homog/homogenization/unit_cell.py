@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.case import Case
+from feti_homog.case import Case, cell_sizes
 from feti_homog.fem import AXIAL, Problem
 from feti_homog.feti import DualSolution, FetiSolver, thresholds
 from feti_homog.feti.decomposition import JumpOperator, SharedEntities, Subdomain, shared_entities
@@ -84,8 +84,9 @@ class TornCell:
 
     def extended(self, u: Float, loads: Float) -> Float:
         """Extend boundary displacements u (boundary dofs, k) to u* (dofs, k) in all parts, under loads (v, k)."""
-        inside, place, of_place = np.empty((self.offsets[-1], u.shape[1]), order="F"), -1, np.zeros(0)
+        inside = np.empty((self.offsets[-1], u.shape[1]), order="F")
         keep = partition_policy.keeps_interiors(self.case)
+        place, of_place = -1, np.zeros(0)
         for part, of_part in self.by_part(inside):
             if part.place != place:
                 place, of_place = part.place, self.solver.extended(part.place, u, loads, keep)
@@ -93,7 +94,7 @@ class TornCell:
         return inside
 
     def by_part(self, u: Float) -> Iterator[tuple[UniformPart, Float]]:
-        """Return each part with its rows of displacements u (dofs, ...)."""
+        """Iterate over the parts, each with a view of its rows in displacements u (dofs, ...)."""
         return zip(self.parts, np.split(u, self.offsets[1:-1]), strict=False)
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
@@ -204,7 +205,8 @@ def tear(
     Raises on every rank, like `tile_tearing.cut` and `solver_plan.build`; `progress` reports the stages.
     """
     part, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, table, recovers = part.summary, part.table, case.output.mesh_error or case.output.fields
+    summary, table = part.summary, part.table
+    recovers = case.output.mesh_error or case.output.fields
     del part  # the submesh of the rank takes as much memory as the submeshes of its subdomains
 
     def solver_of(problem: Problem, subdomains: list[Subdomain]) -> FetiSolver:
@@ -243,7 +245,8 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
-        summary = (part := cut(case, lattice, comm, policy)).summary
+        part = cut(case, lattice, comm, policy)
+        summary = part.summary
         shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
         pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {pieces}")
@@ -253,7 +256,8 @@ def assemble_subdomains(
         for s in map(refinement.halved, part.submeshes.cut()):
             phase_of = summary.constituent_phase[s.constituent]
             material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
-            mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
+            materials = [case.material_of(name) for name in _phases(summary, s)]
+            mixed = tuple(cell_sizes.is_mixed(case.cell.order, m, case.analysis.plane) for m in materials)
             flags = {"is_thin": s.phase == phase_names.COATING, "is_outer": s.phase == phase_names.MATRIX}
             laws = _laws(case, summary, s, problem)
             subdomains.append(Subdomain.build(s, lattice, laws, problem, material, mixed, **flags))
