@@ -60,7 +60,8 @@ class EventsInMemory:
     """
 
     def __init__(self, comm: Intracomm, room: int | None = WHOLE_BYTES) -> None:
-        self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
+        self.comm, self.room = comm, room
+        self._events, self._bytes = list[bytes](), 0
 
     def clear(self) -> None:
         """Remove all events."""
@@ -115,10 +116,12 @@ class Checkpoint(EventsInMemory):
     def count(self) -> int:
         def counted() -> int:
             self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
-            if number := max(len(self._ends) - 1, 0):
-                first, own = next(records(self.path))[1].decode(), self.signature.partition("\n")[0]
-                if (written := first.partition("\n")[0]) != own:
-                    raise CaseError(f"{self.path} is of another run: expected {own}; found {written}")
+            number = max(len(self._ends) - 1, 0)
+            if number:
+                _, signature = next(records(self.path))
+                written, expected = (text.partition("\n")[0] for text in (signature.decode(), self.signature))
+                if written != expected:
+                    raise CaseError(f"{self.path} is of another run: expected {expected}; found {written}")
             return number
 
         try:
@@ -128,11 +131,14 @@ class Checkpoint(EventsInMemory):
 
     def read(self, number: int) -> Arrays:
         def cut() -> list[Arrays]:
-            event, size = unpacked(next(records(self.path, self._ends[number]))[1]), self.comm.size
-            pairs = {name: (v, event.get(f"{name}_ends")) for name, v in event.items() if not name.endswith("_ends")}
+            _, content = next(records(self.path, self._ends[number]))
+            event, size, parts = unpacked(content), self.comm.size, dict[str, list[NDArray[Any]]]()
             try:
-                whole = [[v] * size if at is None else np.split(v, at.reshape(size)[:-1]) for v, at in pairs.values()]
-                return [{name: whole[n][rank] for n, name in enumerate(pairs)} for rank in range(size)]
+                for name, value in event.items():
+                    if not name.endswith("_ends"):
+                        ends = event.get(f"{name}_ends")
+                        parts[name] = [value] * size if ends is None else np.split(value, ends.reshape(size)[:-1])
+                return [{name: of_ranks[rank] for name, of_ranks in parts.items()} for rank in range(size)]
             except (IndexError, TypeError, ValueError) as error:
                 raise CaseError(f"{self.path} is damaged: its arrays are not of {size} ranks") from error
 
@@ -147,11 +153,13 @@ class Checkpoint(EventsInMemory):
             event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
             event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
             if not self._ends:
-                atomic.append(self.path, 0, first := begin(self.signature), False)
+                first = begin(self.signature)
+                atomic.append(self.path, 0, first, lasts=False)
                 self._ends = [len(first)]
             del self._ends[number + 1 :]
             content = record(packed(self._kept(event, self._ends[-1])))
-            atomic.append(self.path, self._ends[-1], content, is_due := monotonic() >= self._due)
+            is_due = monotonic() >= self._due
+            atomic.append(self.path, self._ends[-1], content, lasts=is_due)
             self._due = monotonic() + 1.0 if is_due else self._due
             self._ends.append(self._ends[-1] + len(content))
 
@@ -178,7 +186,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
     try:
         with path.open("rb") as stream:
             place, end = stream.seek(start), os.fstat(stream.fileno()).st_size
-            if not place:
+            if place == 0:
                 line, expected = stream.readline(64), begin("").partition(b"\n")[0] + b"\n"
                 if line != expected and expected.startswith(line):  # the first line is unfinished
                     return

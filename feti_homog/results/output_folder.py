@@ -74,8 +74,8 @@ def refuse_files_of_others(directory: Path) -> None:
     try:
         paths = [p for p in sorted(directory.iterdir()) if p.name in SIGNS or RESULT_FILE.fullmatch(p.name)]
         for path in paths:
-            kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
-            if kind:
+            if path.is_dir() or not path.exists():
+                kind = "a folder there" if path.is_dir() else "a link there that leads nowhere"
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         if any(path.name.startswith("checkpoint") for path in directory.iterdir()):
             from feti_homog.results import checkpoints  # only paths have checkpoints
@@ -83,7 +83,9 @@ def refuse_files_of_others(directory: Path) -> None:
             checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
-        foreign_files = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
+        foreign_files = [path for path in signs or paths if path.stat().st_size]
+        if signs:
+            foreign_files = [path for path in foreign_files if not _is_own(path)]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
     if foreign_files:
@@ -96,24 +98,26 @@ def replaced(directory: Path, case: Case) -> str:
     Raises:
         CaseError: the folder has events of this case, from which a run can go on.
     """
-    path, are_own, line = directory / "checkpoint/events", list[bool](), ""
-    if not path.is_file() and not os.path.lexists(directory / result_json.NAME):
+    path, has_result = directory / "checkpoint/events", os.path.lexists(directory / result_json.NAME)
+    if not path.is_file() and not has_result:
         return ""
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
+    are_own, change = list[bool](), ""  # are_own: of the signature, then of each event
     try:
         signature = b"case %s," % case.digest(False).encode()  # begins the first record
-        are_own += [content.startswith(signature) for _, content in checkpoints.records(path)] if path.is_file() else []
-        if len(are_own) > 1 or os.path.lexists(directory / result_json.NAME):
+        if path.is_file():
+            are_own = [content.startswith(signature) for _, content in checkpoints.records(path)]
+        if len(are_own) > 1 or has_result:
             stored = latest(directory)
             title = f"{wording.toml_value(stored['case']['name'])} ({stored['date']}, {stored['status']})"
-            line = "" if stored["digest"] == case.digest() else f"replaces the result of case {title}"
+            change = "" if stored["digest"] == case.digest() else f"replaces the result of case {title}"
     except (FetiHomogError, LookupError, TypeError) as error:
-        line = f"replaces a result that cannot be read: {error}"
+        change = f"replaces a result that cannot be read: {error}"
     if len(are_own) > 1 and are_own[0]:
         way = f"--resume goes on from them; remove {path.parent} to start again"
         raise CaseError(f"--out {directory}: it holds {len(are_own) - 1} events of this path: {way}")
-    return line and f"warning: {directory}: this run {line}"
+    return f"warning: {directory}: this run {change}" if change else ""
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
@@ -149,11 +153,12 @@ def latest(directory: Path) -> dict[str, Any]:
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
     path = directory / checkpoints.FOLDER / checkpoints.NAME
-    records = checkpoints.records(path) if path.is_file() else ()
-    first, *events = [content for _, content in records] or [b""]
+    contents = [content for _, content in checkpoints.records(path)] if path.is_file() else []
+    signature, events = (contents[0], contents[1:]) if contents else (b"", [])
     stored = result_json.read(directory) if not events or os.path.lexists(directory / result_json.NAME) else {}
     try:
-        opening = result_json.loads(first.decode().partition("\n")[2] or "{}")
+        _, _, entries_of_result = signature.decode().partition("\n")
+        opening = result_json.loads(entries_of_result or "{}")
         if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
             return stored
         points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
@@ -173,7 +178,7 @@ def result_folder(directory: Path) -> Path:
     names = [name for name in STUDIES if os.path.exists(directory / name)]
     if os.path.exists(directory / result_json.NAME) or not names:
         return directory
-    if names == [STUDIES[0]]:
+    if names == ["sweep.json"]:
         raise CaseError(
             f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
             f"`feti-homog collect {directory}` makes tables of all cases"
