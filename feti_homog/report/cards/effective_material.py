@@ -226,7 +226,8 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
     couplings = float((np.abs(k) / np.sqrt(np.outer(values, values)))[~np.eye(3, dtype=bool)].max())
     text = f"Couplings of up to {couplings:.2g} sqrt(kii kjj) are left out."
     if symmetry == "transversely isotropic":
-        values[1:], text = values[1:].mean(), f"{text} k22 and k33 are the mean across the fibres."
+        values[1:] = values[1:].mean()
+        text += " k22 and k33 are the mean across the fibres."
     elif couplings > NEGLIGIBLE:
         raise CaseError("its conductivity has couplings in its axes; use --transversely-isotropic")
     origin = f"Effective conductivity of {name}, by feti_homog {document['version']}; nothing is converted."

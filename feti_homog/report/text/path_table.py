@@ -34,17 +34,16 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     if any(point.get("temperature") for point in points):
         varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
     varying |= {strains[k]: strain[:, k] for k in acting if stresses[k] in prescribed}
-    first = dict(list(varying.items())[:5])
-    rest = [name for name in varying if name not in first]
+    names, rest = [*varying][:5], [*varying][5:]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     rows = [
-        [k, *(without_noise(column[k]) for column in first.values()), *map(points[k].get, ("load_factor", *STATES))]
+        [k, *(without_noise(varying[name][k]) for name in names), *map(points[k].get, ("load_factor", *STATES))]
         for k in numbers
     ]
-    columns = [Column(noun := document["case"]["path"]["method"].removesuffix("s"), len(noun), "d")]
-    columns += [*(Column(name, max(11, len(name) + 1)) for name in first), Column("load", 9, ".6f"), *COUNTS]
-    label = stress_label(document)
+    noun, label = document["case"]["path"]["method"].removesuffix("s"), stress_label(document)
+    columns = [Column(noun, len(noun), "d"), *(Column(name, max(11, len(name) + 1)) for name in names)]
+    columns += [Column("load", 9, ".6f"), *COUNTS]
     totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} {noun}s{some}; {broke} bonds broke", columns, rows, totals)
@@ -58,12 +57,13 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[event]:.0f}"
     end = np.flatnonzero(leg_of == leg_of[event])[-1]
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
-    text = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
-    text = begins.get(largest, text)
-    no_peak = "No stress acts on the path, and there is no peak"
-    text = f"{text}: {_landmark(document, peak, '')}" if "event" in peak else no_peak
+    begins[landmarks.LARGEST] = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
+    text = "No stress acts on the path, and there is no peak"
+    if "event" in peak:
+        text = f"{begins[largest]}: {_landmark(document, peak, '')}"
     for title in ("first_softening_", "first_break_"):
-        text += f"; {title.replace('_', ' ')}{_landmark(document, peak, title)}" if f"{title}event" in peak else ""
+        if f"{title}event" in peak:
+            text += f"; {title.replace('_', ' ')}{_landmark(document, peak, title)}"
     stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
@@ -74,10 +74,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST and event != end:
         text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
-    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
-    errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
+    places = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
+    errors = {place: document["path"][k].get("mesh_error") for place, k in places.items() if k is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
-    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
+    if parts:
+        text += f"; mesh error of the energy {', '.join(parts)}"
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     for leg, k, number in path_curves.largest_of_legs(document):
@@ -102,8 +103,8 @@ def _landmark(document: Document, peak: Document, title: str) -> str:
 def _load_at(document: Document, number: int, name: str, strain: float) -> str:
     """Write the strain of a point with its name, if any, or the temperature on a leg that changes only temperature."""
     if (temperature := path_curves.temperature_of(document, number)) is not None:
-        name, strain = load_sections.TEMPERATURE, temperature
-    return f"{name} = {without_noise(strain):.6g}".removeprefix(" = ")
+        return f"{load_sections.TEMPERATURE} = {without_noise(temperature):.6g}"
+    return f"{name} = {without_noise(strain):.6g}" if name else f"{without_noise(strain):.6g}"
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
