@@ -135,8 +135,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.margins(0.03)
-    axes.set_xlabel(f"$x_1$ {unit}")
-    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.set(xlabel=f"$x_1$ {unit}", ylabel=f"$x_2$ {unit}")
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
@@ -189,7 +188,8 @@ class LoadLabels:
                 (strains[self.leading], float(strain[self.leading])),
                 (stresses[self.leading], stress if abs(stress) > self.least_stress else 0.0),
             ]
-        loads += [("temperature", temperature)] * (temperature != 0.0)
+        if temperature != 0.0:
+            loads.append(("temperature", temperature))
         return [_formula(name, value) for name, value in loads] or ["no strain"]
 
     def label(self, attributes: Any, in_line: int = 4) -> str:
