@@ -60,8 +60,7 @@ class EventsInMemory:
     """
 
     def __init__(self, comm: Intracomm, room: int | None = WHOLE_BYTES) -> None:
-        self.comm, self.room = comm, room
-        self._events, self._bytes = list[bytes](), 0
+        self.comm, self.room, self._events, self._bytes = comm, room, list[bytes](), 0
 
     def clear(self) -> None:
         """Remove all events."""
@@ -116,8 +115,7 @@ class Checkpoint(EventsInMemory):
     def count(self) -> int:
         def counted() -> int:
             self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
-            number = max(len(self._ends) - 1, 0)
-            if number:
+            if number := max(len(self._ends) - 1, 0):
                 _, signature = next(records(self.path))
                 written, expected = (text.partition("\n")[0] for text in (signature.decode(), self.signature))
                 if written != expected:
@@ -134,10 +132,9 @@ class Checkpoint(EventsInMemory):
             _, content = next(records(self.path, self._ends[number]))
             event, size, parts = unpacked(content), self.comm.size, dict[str, list[NDArray[Any]]]()
             try:
-                for name, value in event.items():
-                    if not name.endswith("_ends"):
-                        ends = event.get(f"{name}_ends")
-                        parts[name] = [value] * size if ends is None else np.split(value, ends.reshape(size)[:-1])
+                for name in [name for name in event if not name.endswith("_ends")]:
+                    value, ends = event[name], event.get(f"{name}_ends")
+                    parts[name] = [value] * size if ends is None else np.split(value, ends.reshape(size)[:-1])
                 return [{name: of_ranks[rank] for name, of_ranks in parts.items()} for rank in range(size)]
             except (IndexError, TypeError, ValueError) as error:
                 raise CaseError(f"{self.path} is damaged: its arrays are not of {size} ranks") from error
@@ -153,9 +150,8 @@ class Checkpoint(EventsInMemory):
             event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
             event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
             if not self._ends:
-                first = begin(self.signature)
-                atomic.append(self.path, 0, first, lasts=False)
-                self._ends = [len(first)]
+                atomic.append(self.path, 0, begin(self.signature), lasts=False)
+                self._ends = [len(begin(self.signature))]
             del self._ends[number + 1 :]
             content = record(packed(self._kept(event, self._ends[-1])))
             is_due = monotonic() >= self._due

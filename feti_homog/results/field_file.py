@@ -132,8 +132,7 @@ class FieldFile:
         """Return an upper bound (bytes) for a part's tables and their headers, over all ranks."""
         size = 0
         for name, description in field_layout.tables(part).items():
-            row_shape = np.shape(getattr(part, name))[1:]
-            row_bytes = np.dtype(description.dtype).itemsize * int(np.prod(row_shape))
+            row_bytes = np.dtype(description.dtype).itemsize * int(np.prod(np.shape(getattr(part, name))[1:]))
             # 4 KiB bound HDF5's header of a table; its measured size is 0.6 KB.
             size += (1 << 12) + row_bytes * self._rows[field_layout.rows_of(description)].total
         return size

@@ -118,8 +118,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 def _require_mesh(path: Path, file: Any) -> None:
     """Check case, element areas, fibres, interface nodes, and names of phases and states.  Raises CaseError."""
     try:
-        case = result_json.loads(file.attrs["case"])
-        cases.check_stored(case)
+        cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:
         raise CaseError(f"cannot read {path}: the case in it is damaged: {str(error).splitlines()[0]}") from error
     points, triangles, flat = file["mesh/points"][()], file["mesh/triangles"], 0

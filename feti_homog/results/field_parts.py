@@ -144,9 +144,7 @@ def _at_nodes(
     If subdomains extend across materials, all interface nodes are bonded.
     """
     nodes, state, is_across = cell.jumps.nodes, response.state, cell.summary.across
-    u3 = traction3 = jump3 = None
-    if along is not None:
-        u3, traction3, jump3 = along.displacement, along.traction, along.jump
+    u3, traction3, jump3 = (None,) * 3 if along is None else (along.displacement, along.traction, along.jump)
     opening = _vectors(_in_axes(nodes.normal, in_plane.jump), jump3)
     fibre = _vectors(in_plane.displacement, u3)[cell.class_nodes[nodes.fibre_node]]
     zeros = np.zeros(len(nodes.row), np.int8)

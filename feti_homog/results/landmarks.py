@@ -199,9 +199,8 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size = _norm(stress, 2.0)
     largest = float(size.max())
-    threshold = LEAST_DROP * largest
-    turns = pairwise(turning_points(size, threshold))
-    entries = [(float(size[a] - size[b]), a, b) for a, b in turns if size[a] > size[b]]
+    least = LEAST_DROP * largest
+    entries = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
     scaled = largest / (float(_norm(strain, 0.5).max()) or 1.0) * strain  # strains as stresses
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + path_curves.SAME_LOAD).sum()) if legs else 0
@@ -217,7 +216,7 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     for a, b in pairwise([*starts.tolist(), len(load)]):
         jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
         jumps.append((jump, a, min(b, len(load) - 1)))
-    return entries + [drop for drop in jumps if drop[0] > threshold]
+    return entries + [drop for drop in jumps if drop[0] > least]
 
 
 def _norm(values: Float, shear: float) -> Float:

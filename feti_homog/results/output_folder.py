@@ -66,8 +66,8 @@ def usable(directory: Path) -> None:
 def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
-    Raises:
-        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder is unreadable.
+    Raises CaseError if a folder, a broken link or a foreign file has the name of a result file, or the folder is
+    unreadable.
     """
     if not directory.is_dir():
         return
@@ -83,9 +83,7 @@ def refuse_files_of_others(directory: Path) -> None:
             checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
-        foreign_files = [path for path in signs or paths if path.stat().st_size]
-        if signs:
-            foreign_files = [path for path in foreign_files if not _is_own(path)]
+        foreign_files = [p for p in signs or paths if p.stat().st_size and (not signs or not _is_own(p))]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
     if foreign_files:
@@ -95,8 +93,7 @@ def refuse_files_of_others(directory: Path) -> None:
 def replaced(directory: Path, case: Case) -> str:
     """Return a warning if a run replaces an unreadable result, or one of another case; else "".  Call on one rank.
 
-    Raises:
-        CaseError: the folder has events of this case, from which a run can go on.
+    Raises CaseError if the folder has events of this case, from which a run can go on.
     """
     path, has_result = directory / "checkpoint/events", os.path.lexists(directory / result_json.NAME)
     if not path.is_file() and not has_result:
@@ -157,8 +154,7 @@ def latest(directory: Path) -> dict[str, Any]:
     signature, events = (contents[0], contents[1:]) if contents else (b"", [])
     stored = result_json.read(directory) if not events or os.path.lexists(directory / result_json.NAME) else {}
     try:
-        _, _, entries_of_result = signature.decode().partition("\n")
-        opening = result_json.loads(entries_of_result or "{}")
+        opening = result_json.loads(signature.decode().partition("\n")[2] or "{}")
         if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
             return stored
         points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
@@ -188,10 +184,9 @@ def result_folder(directory: Path) -> Path:
 
 
 def refuse_begun(directory: Path) -> None:
-    """Refuse the folder of a begun run that has no result.json yet.  Call on one rank.
+    """Raise CaseError for the folder of a begun run that has no result.json yet.  Call on one rank.
 
-    Raises:
-        CaseError: the run still works, or ended early; for a path, the message gives the number of points and the load.
+    The run still works, or ended early; for a path, the message gives the number of points and the load.
     """
     is_begun = any(os.path.lexists(directory / name) for name in (LOCK, "checkpoint"))
     if not is_begun or os.path.lexists(directory / result_json.NAME):

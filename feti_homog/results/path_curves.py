@@ -43,8 +43,7 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
 
 def changed_components(document: Document, leg: int | None = None) -> list[int]:
     """Return the indices of the components that change at waypoint `leg`, from 1, or by default at any waypoint."""
-    pairs = voigt.plane_state_of(document).components
-    changed = set[int]()
+    pairs, changed = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for number, target in enumerate(targets(document), start=1):
         for component, names in enumerate(pairs):
@@ -62,10 +61,7 @@ def stresses(document: Document) -> Float:
 
 
 def noise(document: Document) -> float:
-    """Return a bound of the solver's noise in stresses.
-
-    It is `ZERO` times the largest stress or, if this is larger, times the largest strain and the least modulus.
-    """
+    """Return the solver's noise: `ZERO` times the larger of largest stress, and largest strain times least modulus."""
     strain, stress = (np.abs([point[name] for point in document["path"]]).max() for name in ("strain", "stress"))
     named = [constant for phase in document["case"].get("material", {}).values() for constant in phase.items()]
     moduli = [np.max(value) for name, value in named if value and name.startswith(("young", "E", "G", "stiffness"))]
@@ -131,9 +127,8 @@ def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
 
 def legs_of(document: Document) -> Float:
     """Return the leg (n,) of each point, counted from 1."""
-    count = legs(document)
-    position = count * np.array([point["load_factor"] for point in document["path"]])
-    return np.asarray(np.ceil(position - SAME_LOAD * count).clip(1))
+    position = legs(document) * np.array([point["load_factor"] for point in document["path"]])
+    return np.asarray(np.ceil(position - SAME_LOAD * legs(document)).clip(1))
 
 
 def components_above(share: float, values: Float) -> list[int]:

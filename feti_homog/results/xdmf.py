@@ -61,10 +61,8 @@ def write(directory: Path) -> list[Path]:
     """Write the XDMF files for `directory`/result.h5; return their paths.  Call on one rank.
 
     result.xdmf has the fields on nodes and elements of the cell.  A cell with interface nodes also gets interface.xdmf,
-    with the fields at interface points.  Each file has one temporal collection, with state numbers as times.
-
-    Raises:
-        FetiHomogError: result.h5 cannot be read or a file cannot be written.
+    with the fields at interface points.  Each file has one temporal collection, with state numbers as times.  Raises
+    FetiHomogError if result.h5 cannot be read or a file cannot be written.
     """
     h5, paths = Path(directory) / field_file.NAME, list[Path]()
     with atomic.file_errors("write", Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
