@@ -31,7 +31,8 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
     has_toughness, scale = law_at(cell.files).has_toughness, float(np.finfo(float).tiny)
     if has_toughness:
         scale = max(points[-1]["fracture_energy"], scale)
-        findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
+        first = np.where(by_events, points[0]["fracture_energy"] / scale, 0.0)
+        findings.record("energy", first, "path[0].fracture_energy")
     for state, after in pairwise(states):
         bonded, bonded_after = (numbers.status == Status.BONDED for numbers in (state, after))
         damaged = after.damage > state.damage
@@ -152,7 +153,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         has_factor = "factor" in point  # else no load in this direction breaks a bond
         imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
         strain = np.array(point["strain"]) if has_factor else imposed
-        shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
+        shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature if has_factor else 0.0]), rcond=None)
         traction = np.asarray(np.tensordot(shares, unit_tractions, axes=1), float)
         used = np.where(may_break, law.onset(traction), 0.0)
         if not has_factor:

@@ -50,7 +50,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         for name, value in zip(names, values + sign * STEP * direction, strict=True):
             table, key, index = _place(case, name)
             numbers = np.array(table[key], float)
-            numbers[index] = numbers[index[::-1]] = value
+            numbers[index] = numbers[index[::-1]] = value  # matrices are symmetric
             table[key] = numbers.tolist()
         energies.append(_energies(cell, states, case))
     check = _check_load if "load" in document else _check_moduli
@@ -73,7 +73,7 @@ def _parameters(cell: DiscreteCell) -> set[str]:
             numbers = np.array([*value] if isinstance(value, dict) else value)
             ends = [f".{end}" for end in (value if isinstance(value, dict) else range(1, numbers.size + 1))]
             if numbers.ndim > 1:
-                ends = [f".{'Ck'[conducts]}{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+                ends = [f".{'k' if conducts else 'C'}{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
             names |= {f"material.{phase}.{key}{end}" for end in (ends if numbers.ndim else [""])}
     springs = ("conductance",) if conducts else SPRINGS
     for number, section in enumerate(sections, start=1):
