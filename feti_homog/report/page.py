@@ -43,11 +43,8 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 def write(directory: Path) -> Path:
     """Write `directory`/report.html from result.json and the stored pictures; return its path.
 
-    Call on one rank.
-
-    Raises:
-        CaseError: the folder has no result, or has a missing or damaged file.
-        FetiHomogError: result.json cannot be read, or the report cannot be written.
+    Call on one rank.  Raises CaseError if the folder has no result, or has a missing or damaged file; FetiHomogError if
+    result.json cannot be read, or the report cannot be written.
     """
     document = output_folder.latest(directory)
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)

@@ -189,10 +189,9 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                 if (match := HEAD.fullmatch(line)) is None:
                     raise CaseError(f"{path} is damaged: it does not begin as an event file")
                 if int(match[1]) != FORMAT:
-                    raise CaseError(
-                        f"{path} has the checkpoints' format {int(match[1])}, this program reads format {FORMAT}; "
-                        "go on with the program that wrote it, or start again without --resume"
-                    )
+                    formats = f"the checkpoints' format {int(match[1])}, this program reads format {FORMAT}"
+                    cure = "go on with the program that wrote it, or start again without --resume"
+                    raise CaseError(f"{path} has {formats}; {cure}")
                 place = len(line)
             for number in count():
                 if len(prefix := stream.read(PREFIX.size)) < PREFIX.size:
@@ -234,9 +233,8 @@ def unpacked(content: bytes) -> Arrays:
 def refuse_others(directory: Path) -> None:
     """Check that the checkpoint folders in `directory` are missing, or contain only events.  Call on one rank.
 
-    Raises:
-        CaseError: a file or a link has such a name, or a folder has files other than events.
-        OSError: the folder cannot be read.
+    Raises CaseError if a file or a link has such a name, or a folder has files other than events; OSError if a folder
+    cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -244,10 +242,8 @@ def refuse_others(directory: Path) -> None:
             raise CaseError(f"--out {directory}: {folder.name} is a {kind} there, and a run makes that folder")
         paths = list(folder.iterdir()) if folder.is_dir() else []
         if foreign := [path.name for path in paths if path.name != NAME or not path.is_file()]:
-            raise CaseError(
-                f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
-                f"{folder.name}; move it away or choose another folder"
-            )
+            fault = f"no run of this program wrote {folder.name}/{min(foreign)}, and a run removes {folder.name}"
+            raise CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 
 def remove(directory: Path) -> None:

@@ -140,10 +140,8 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
             names = ("temperature",) if is_thermal else (peak["stress_name"], peak["strain_name"])
             ends = slice(k - 1, k + 1)
             places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *table[name]][ends]):.4g}" for name in names]
-            lines.append(
-                f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {', '.join(places)}{before} "
-                "takes the phase as elastic beyond"
-            )
+            passed = f"the utilisation reaches 1 at about {', '.join(places)}"
+            lines.append(f"[material.{phase['phase']}] strength: {passed}{before} takes the phase as elastic beyond")
     return lines
 
 

@@ -119,10 +119,8 @@ def replaced(directory: Path, case: Case) -> str:
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
     """Return the error for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
-    return CaseError(
-        f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
-        "move it away or choose another folder"
-    )
+    fault = f"no {kind} of this program wrote {name}, and this one would replace it"
+    return CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 
 def _is_own(path: Path) -> bool:
@@ -175,10 +173,8 @@ def result_folder(directory: Path) -> Path:
     if os.path.exists(directory / result_json.NAME) or not names:
         return directory
     if names == ["sweep.json"]:
-        raise CaseError(
-            f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
-            f"`feti-homog collect {directory}` makes tables of all cases"
-        )
+        expected = f"expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep"
+        raise CaseError(f"{directory}: {expected}; `feti-homog collect {directory}` makes tables of all cases")
     names += ["fit.png"] if "fit.json" in names else []
     raise CaseError(f"{directory} has a study: see {', '.join(names)}")
 
@@ -205,9 +201,8 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     Removes unfinished files from earlier runs, and at the end new folders that stayed empty.  On a file system without
     locks, `say` gets a warning and the run continues without a lock.
 
-    Raises:
-        CaseError: the folder cannot be made, or another run has locked it.
-        FetiHomogError: the lock file cannot be created or locked.
+    Raises CaseError if the folder cannot be made, or another run has locked it; FetiHomogError if the lock file cannot
+    be created or locked.
     """
     lock = file_locks.Lock(directory / LOCK)
 

@@ -243,9 +243,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
     """Check a file against its seal; `block` is as in `seal`.  Call on one rank.
 
-    Raises:
-        CaseError: size or checksum differ.
-        FetiHomogError: the file cannot be read.
+    Raises CaseError if size or checksum differ, FetiHomogError if the file cannot be read.
     """
     with atomic.file_errors("read", path):
         size = os.stat(path).st_size

@@ -90,8 +90,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface.mark(axes, moved, state, magnified=0.8)
-        axes.set_aspect("equal")
-        axes.set(xticks=(), yticks=())
+        axes.set(aspect="equal", xticks=(), yticks=())
         axes.set_axis_off()
         # Letters are about half of the font size wide; a panel is a quarter wider than its axes before the layout.
         letters = int(180.0 * axes.bbox.width / axes.figure.dpi / float(axes.title.get_fontsize()))

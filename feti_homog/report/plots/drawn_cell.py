@@ -183,11 +183,9 @@ class LoadLabels:
         strains, stresses = voigt.voigt_names(len(strain))
         loads = [(strains[k], float(strain[k])) for k in path_curves.components_above(path_curves.FAINT, strain[None])]
         if self.leading is not None and len(loads) > 2:
-            stress = float(attributes["stress"][self.leading])
-            loads = [
-                (strains[self.leading], float(strain[self.leading])),
-                (stresses[self.leading], stress if abs(stress) > self.least_stress else 0.0),
-            ]
+            k, stress = self.leading, float(attributes["stress"][self.leading])
+            visible_stress = stress if abs(stress) > self.least_stress else 0.0
+            loads = [(strains[k], float(strain[k])), (stresses[k], visible_stress)]
         if temperature != 0.0:
             loads.append(("temperature", temperature))
         return [_formula(name, value) for name, value in loads] or ["no strain"]

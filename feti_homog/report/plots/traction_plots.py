@@ -72,11 +72,8 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     if np.abs(last_state["jump"][:]).max() < SAME_PLACE**2 * file.attrs["width"]:
         grid[0][1].set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
     shaded = status[np.isin(fibre, chosen)]
-    patches = [
-        Patch(color=drawn_cell.STATE_COLOURS[kind], label=drawn_cell.STATE_NAMES[kind], **SHADE)
-        for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
-        if kind in shaded
-    ]
+    kinds = [kind for kind in (drawn_cell.OPEN, drawn_cell.CLOSED) if kind in shaded]
+    patches = [Patch(color=drawn_cell.STATE_COLOURS[k], label=drawn_cell.STATE_NAMES[k], **SHADE) for k in kinds]
     plot_helpers.legend_below(picture, patches)
     before, last, labels = file[f"state/{names[0]}"].attrs, last_state.attrs, drawn_cell.LoadLabels.of(document)
     title = f"{last['label']}: {labels.label(last)}"

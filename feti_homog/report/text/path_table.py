@@ -37,10 +37,8 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     names, rest = [*varying][:5], [*varying][5:]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
-    rows = [
-        [k, *(without_noise(varying[name][k]) for name in names), *map(points[k].get, ("load_factor", *STATES))]
-        for k in numbers
-    ]
+    load = ("load_factor", *STATES)
+    rows = [[k, *(without_noise(varying[name][k]) for name in names), *map(points[k].get, load)] for k in numbers]
     noun, label = document["case"]["path"]["method"].removesuffix("s"), stress_label(document)
     columns = [Column(noun, len(noun), "d"), *(Column(name, max(11, len(name) + 1)) for name in names)]
     columns += [Column("load", 9, ".6f"), *COUNTS]
@@ -116,11 +114,8 @@ def _path_energies(document: Document, label: str) -> list[str]:
     points, last = document["path"], document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
-    lines = [
-        f"Work per area{label}: {last['work']:.6g}",
-        *energies(last, label),
-        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
-    ]
+    lines = [f"Work per area{label}: {last['work']:.6g}", *energies(last, label)]
+    lines.append(f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}")
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
         ends = [points[number] for number in path_curves.ends_of_legs(document)]

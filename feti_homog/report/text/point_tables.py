@@ -119,12 +119,12 @@ def envelope_table(document: Document, limit: int | None = None) -> Table:
     step = max(1, ceil(len(points) / (limit or ENVELOPE_ROWS)))
     while len(points) % step:  # directions are evenly spaced
         step += 1
-    rows = [
-        [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
-        if "factor" in point
-        else [point["angle"], "none", "none", *[""] * len(names)]
-        for point in points[::step]
-    ]
+    rows = []
+    for point in points[::step]:
+        if "factor" in point:
+            rows.append([point["angle"], *components(point), *(without_noise(point[name]) for name in names)])
+        else:
+            rows.append([point["angle"], "none", "none", *[""] * len(names)])
     return Table(title, columns, rows, above)
 
 
