@@ -71,7 +71,7 @@ def require_tables(path: Path, state: int | None) -> None:
 
 
 def _require_layout(path: Path, file: Any, state: int | None) -> None:
-    """Compare tables and attributes with `field_layout`, and numbers with RANGES as in `require_own`; CaseError."""
+    """Refuse tables and attributes unlike `field_layout`, and numbers outside RANGES.  Raises as `require_own` does."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
     counts = {symbol: entry.shape[0] if entry.shape else 0 for symbol, entry in entries.items()}

@@ -131,7 +131,7 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
     `numbers` are interpolated linearly, from 0 on.
     """
     lines, table = list[str](), path_curves.table_of([document["path"][number] for number in numbers])
-    before = ", before the largest stress of the path, which" if "event" in peak else "; the path"
+    subject = ", before the largest stress of the path, which" if "event" in peak else "; the path"
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
@@ -141,7 +141,7 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
             ends = slice(k - 1, k + 1)
             places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *table[name]][ends]):.4g}" for name in names]
             passed = f"the utilisation reaches 1 at about {', '.join(places)}"
-            lines.append(f"[material.{phase['phase']}] strength: {passed}{before} takes the phase as elastic beyond")
+            lines.append(f"[material.{phase['phase']}] strength: {passed}{subject} takes the phase as elastic beyond")
     return lines
 
 

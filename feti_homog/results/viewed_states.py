@@ -151,8 +151,8 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
 
 def _grid(state: ViewedState) -> ET.Element:
     """Convert a state into VTK's XML, with arrays in base64."""
-    form = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
-    root = ET.Element("VTKFile", form)
+    header = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    root = ET.Element("VTKFile", header)
     m, columns = state.cells.shape
     sizes = {"NumberOfPoints": str(len(state.points)), "NumberOfCells": str(m)}
     grid = ET.SubElement(root, "UnstructuredGrid")

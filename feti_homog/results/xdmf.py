@@ -105,8 +105,8 @@ def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
     """
     names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
     if "temperature" in attributes:
-        names, stress = [*names, "temperature"], stress[TENSOR]
-        strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
+        names.append("temperature")
+        strain, stress = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5), stress[TENSOR]
     numbers = {name: np.array([[attributes[name]]], float) for name in names}
     return numbers | {"mean_strain": strain[None], "mean_stress": stress[None]}
 

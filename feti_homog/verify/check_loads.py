@@ -166,12 +166,12 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check prescribed strains and stresses, and the temperature, relative to `scales`."""
+    """Check prescribed strains, stresses and the temperature, each relative to one of the three `scales`."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
-    values, by_stress = load.values[:v], load.by_stress[:v]
-    findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
-    findings.record("stress load", np.abs(stress - values)[by_stress] / scales[1], f"{place}, stress")
-    findings.compare("load", numbers.get(TEMPERATURE, 0.0), load.values[v:].sum(), scales[2], f"{place}, temperature")
+    values, by_stress, (of_strain, of_stress, of_heat) = load.values[:v], load.by_stress[:v], scales
+    findings.record("load", np.abs(strain - values)[~by_stress] / of_strain, f"{place}, strain")
+    findings.record("stress load", np.abs(stress - values)[by_stress] / of_stress, f"{place}, stress")
+    findings.compare("load", numbers.get(TEMPERATURE, 0.0), load.values[v:].sum(), of_heat, f"{place}, temperature")
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:

@@ -118,8 +118,8 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     angle = np.radians([fibre.hint("angle", 0.0) for fibre in fibres])
     thickness = np.array([fibre.hint("coating", np.nan) for fibre in fibres], float)
     turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
-    of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
-    frames = turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None]
+    fibre, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
+    frames = turn[fibre] * (np.array(axes, float).reshape(-1, 2)[fibre] + coats[:, None])[:, None]
     # Nodes of a side that are no interface nodes have row -1, and get no share.
     row, is_quadratic, k = cell.inner_rows, nodes.shape[1] == 3, len(rows.length)
     points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)

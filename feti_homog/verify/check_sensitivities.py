@@ -101,7 +101,7 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
         law, floor = "constants", 0.0
         thermal = {name: value for name, value in constants.items() if name.startswith("thermal")}
         constants = thermal | _entries("C", C)
-        changes = {f"C{k + 1}{k + 1}": slope[k, k] for k in range(n)}
+        changes = {f"C{i + 1}{i + 1}": slope[i, i] for i in range(n)}
         for name, energy in zip(changes, np.diag(_energies(cell, states, cell.files.case)), strict=True):
             value = data["constant_values"][data["constants"].index(name)]
             findings.compare("constants", value, energy, max(abs(energy), TINY), name)

@@ -54,15 +54,15 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     present = np.unique(drawn.phase)
     # Legends leave out labels that begin with "_".
     labels = [f" {name}" if name.startswith("_") else name for name in phases]
-    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=labels[k]) for k in present[:IN_LEGEND]]
-    arcs = list[Line2D]()
+    style: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.6}
+    entries: list[Any] = [Patch(facecolor=inks[k], label=labels[k], **style) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     state = cell.file.get("state/0")  # before the load breaks bonds
-    if state is not None and (edges := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
-        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[edges]], CUT, 2.4, "round")
-        arcs = [Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded")]
-    plot_helpers.legend_below(picture, [*entries, *arcs], 4)
+    if state is not None and (is_open := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
+        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[is_open]], CUT, 2.4, "round")
+        entries.append(Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded"))
+    plot_helpers.legend_below(picture, entries, 4)
     return picture
 
 

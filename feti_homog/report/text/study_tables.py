@@ -30,11 +30,12 @@ def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
         rows.append([tables.with_unit(name, stress_unit), *numbers, f"  {bound}{', '.join(best)}"])
     printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
-    columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
-    printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
-    columns = [FIRST, *(tables.Column(name) for name in NUMBERS[:3]), tables.Column("in std", 10, ".2f")]
+    if len(rows) > 1:
+        heads = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
+        printed.append(tables.Table("Correlation", heads, rows, title_in_head=True))
+    heads = [FIRST, *map(tables.Column, ("value", "std", "computed")), tables.Column("in std", 10, ".2f")]
     rows = [[label, *(datum[n] for n in NUMBERS)] for label, datum in zip(data, measured, strict=True)]
-    printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
+    printed.append(tables.Table("Measured", heads, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
     total = "beyond all numbers" if document["sum_of_squares"] is None else f"{document['sum_of_squares']:.4g}"
     notes = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
