@@ -133,25 +133,26 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
     """
     data, point = cell.files.document["sensitivities"], cell.files.document["load"]
     pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
-    rows = dict(zip(data["constants"], zip(data["constant_values"], data["derivatives"], strict=True), strict=True))
-    answers = [[name for name in pair if name in rows] for pair in pairs]
-    is_complete = all(len(names) == 1 for names in answers) and "stored" in rows
+    values = dict(zip(data["constants"], data["constant_values"], strict=True))
+    derivatives = dict(zip(data["constants"], data["derivatives"], strict=True))
+    answers = [[name for name in pair if name in values] for pair in pairs]
+    is_complete = all(len(names) == 1 for names in answers) and "stored" in values
     findings.require("tables", is_complete, "sensitivities, constants of the load")
     if not is_complete:
         return
-    stored_terms = np.array(rows["stored"][1]) * direction
+    stored_terms = np.array(derivatives["stored"]) * direction
     terms, rest = np.zeros_like(direction), stored_terms.copy()
     for (name,), strain, stress, (strain_name, _) in zip(answers, point["strain"], point["stress"], pairs, strict=True):
         value, conjugate, sign = (strain, stress, -1) if name == strain_name else (stress, strain, 1)
         size = max(map(abs, point["strain" if name == strain_name else "stress"]))
-        findings.compare("constants", rows[name][0], value, size, name)
-        change = conjugate / 2 * np.array(rows[name][1]) * direction
+        findings.compare("constants", values[name], value, size, name)
+        change = conjugate / 2 * np.array(derivatives[name]) * direction
         terms, rest = terms + sign * change, rest - change
     if states[0].temperature:
         data.leaves_open("derivatives")
         return
     energy = _energies(cell, states, cell.files.case)[0, 0] / 2
-    findings.compare("constants", rows["stored"][0], energy, max(abs(energy), TINY), "stored")
+    findings.compare("constants", values["stored"], energy, max(abs(energy), TINY), "stored")
     scale = max(float(np.abs(terms).max()), float(np.abs(stored_terms).max()), abs(energy))
     off = [terms.sum() - slope[0, 0] / 2, rest.sum()]
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])

@@ -191,7 +191,7 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     if analysis.is_followed:
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)
     else:  # the first unit load, if an angle has several
-        every = range(0, count, count // len(document[analysis.name]) or 1)
+        every = range(0, count, max(1, count // len(document[analysis.name])))
         numbers = [every[k] for k in shown_states(document, MAX_ANGLES, len(every))]
     cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]

@@ -42,9 +42,8 @@ def plot(
     scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by
     number, label or mark, only state_K.png is drawn.  Call on one rank.
 
-    Raises:
-        CaseError: the result is damaged, or has no such state or component.
-        FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
+    Raises CaseError if the result is damaged, or has no such state or component; FetiHomogError if result.h5 cannot be
+    read, or a picture cannot be written.
     """
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     stored = {path.name for path in directory.iterdir()} & {result_json.NAME, checkpoints.FOLDER}
