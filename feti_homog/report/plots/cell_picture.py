@@ -59,8 +59,8 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     state = cell.file.get("state/0")  # before the load breaks bonds
-    if state is not None and (is_open := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
-        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[is_open]], CUT, 2.4, "round")
+    if state is not None and (is_debonded := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
+        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[is_debonded]], CUT, 2.4, "round")
         entries.append(Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded"))
     plot_helpers.legend_below(picture, entries, 4)
     return picture

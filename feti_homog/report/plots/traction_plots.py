@@ -90,8 +90,8 @@ def _limit(column: Sequence[Axes]) -> None:
     """Limit the common ordinate if a few nodes at singular tips exceed all other values; mark the hidden extremes."""
     curves = [np.concatenate([np.asarray(line.get_ydata(), float) for line in axes.lines]) for axes in column]
     values = np.concatenate(curves)
-    first, last = np.percentile(values, (SPIKES, 100.0 - SPIKES))
-    low, high = 2.0 * first - last, 2.0 * last - first
+    lower, upper = np.percentile(values, (SPIKES, 100.0 - SPIKES))
+    low, high = 2.0 * lower - upper, 2.0 * upper - lower
     if high > low and (values.min() < low or values.max() > high):
         column[0].set_ylim(max(values.min(), low), min(values.max(), high))
         for axes, curve in zip(column, curves, strict=True):
