@@ -43,11 +43,8 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 def write(directory: Path) -> Path:
     """Write `directory`/report.html from result.json and the stored pictures; return its path.
 
-    Call on one rank.
-
-    Raises:
-        CaseError: the folder has no result, or has a missing or damaged file.
-        FetiHomogError: result.json cannot be read, or the report cannot be written.
+    Call on one rank.  Raises CaseError if the folder has no result, or has a missing or damaged file; FetiHomogError if
+    result.json cannot be read, or the report cannot be written.
     """
     document = output_folder.latest(directory)
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
@@ -63,7 +60,7 @@ def page(document: Document, directory: Path) -> str:
 
     Raises OSError, KeyError, TypeError or ValueError if a result file is missing or damaged.
     """
-    title, status, files = escape(title_of(document)), document["status"], resources.files("feti_homog.report")
+    files, status = resources.files("feti_homog.report"), document["status"]
     style = files.joinpath("page.css").read_text(encoding="utf-8")
     captions = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
     captions |= {at: f"Deformed cell, {at.stem.replace('_', ' ')}" for at in sorted(directory.glob("state_*.png"))}
@@ -78,28 +75,28 @@ def page(document: Document, directory: Path) -> str:
         for label in REMARKS
         for remark in document.get(f"{label.lower()}s", ())
     ]
-    texts = dict[str, str]()
+    cards = dict[str, str]()
     for form in export.FORMATS:
         with suppress(CaseError):  # the result has no material that the format can carry
-            texts[f"Material card, {form}"] = export.card_of(document, form)
-    texts["Case file, with the defaults of its keys"] = tomli_w.dumps(document["case"])
-    *cards, case = (
-        f"<details><summary>{name}</summary>\n<pre>{escape(t)}</pre></details>" for name, t in texts.items()
-    )
+            cards[f"Material card, {form}"] = export.card_of(document, form)
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
         "Remarks": "\n".join(remarks),
         "Checks": f'<div class="scroll">{checks(document).html}</div>',
         "Pictures": "\n".join(pictures) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
-        "Cards": "\n".join(cards),
-        "Case": case,
+        "Cards": "\n".join(_folded(name, card) for name, card in cards.items()),
+        "Case": _folded("Case file, with the defaults of its keys", tomli_w.dumps(document["case"])),
     }
-    filled = {name: body for name, body in sections.items() if body}
+    filled = {name: content for name, content in sections.items() if content}
     links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in filled)
-    body = "\n".join(f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{t}\n</section>' for name, t in filled.items())
-    verdict, run = "good" if status == "done" else "bad", f"{document['version']}, run of {document.get('date', '')}"
+    parts = [f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{part}\n</section>' for name, part in filled.items()]
+    run = f"{document['version']}, run of {document['date']}" if document.get("date") else document["version"]
     return Template(files.joinpath("page.html").read_text(encoding="utf-8")).substitute(
-        policy=POLICY, title=title, style=style, run=escape(run.removesuffix(", run of ")), verdict=verdict,
-        status=escape(status), links=links, body=body,
+        policy=POLICY, title=escape(title_of(document)), style=style, run=escape(run), status=escape(status),
+        verdict="good" if status == "done" else "bad", links=links, body="\n".join(parts),
     )  # fmt: skip
+
+
+def _folded(title: str, text: str) -> str:
+    return f"<details><summary>{title}</summary>\n<pre>{escape(text)}</pre></details>"

@@ -18,9 +18,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Replace the file `path` by the output of `write`, in one step; return `path`.
 
     `write` gets the name of an unfinished file in the same folder.  After any exception the unfinished file is removed.
-
-    Raises:
-        FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
+    Raises FetiHomogError if the file cannot be written; an earlier file at `path` is untouched.
     """
     part = part_of(path)
     with file_errors("write", path):

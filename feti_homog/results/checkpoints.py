@@ -116,9 +116,10 @@ class Checkpoint(EventsInMemory):
         def counted() -> int:
             self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
             if number := max(len(self._ends) - 1, 0):
-                first, own = next(records(self.path))[1].decode(), self.signature.partition("\n")[0]
-                if (written := first.partition("\n")[0]) != own:
-                    raise CaseError(f"{self.path} is of another run: expected {own}; found {written}")
+                _, signature = next(records(self.path))
+                written, expected = (text.partition("\n")[0] for text in (signature.decode(), self.signature))
+                if written != expected:
+                    raise CaseError(f"{self.path} is of another run: expected {expected}; found {written}")
             return number
 
         try:
@@ -128,11 +129,13 @@ class Checkpoint(EventsInMemory):
 
     def read(self, number: int) -> Arrays:
         def cut() -> list[Arrays]:
-            event, size = unpacked(next(records(self.path, self._ends[number]))[1]), self.comm.size
-            pairs = {name: (v, event.get(f"{name}_ends")) for name, v in event.items() if not name.endswith("_ends")}
+            _, content = next(records(self.path, self._ends[number]))
+            event, size, parts = unpacked(content), self.comm.size, dict[str, list[NDArray[Any]]]()
             try:
-                whole = [[v] * size if at is None else np.split(v, at.reshape(size)[:-1]) for v, at in pairs.values()]
-                return [{name: whole[n][rank] for n, name in enumerate(pairs)} for rank in range(size)]
+                for name in [name for name in event if not name.endswith("_ends")]:
+                    value, ends = event[name], event.get(f"{name}_ends")
+                    parts[name] = [value] * size if ends is None else np.split(value, ends.reshape(size)[:-1])
+                return [{name: of_ranks[rank] for name, of_ranks in parts.items()} for rank in range(size)]
             except (IndexError, TypeError, ValueError) as error:
                 raise CaseError(f"{self.path} is damaged: its arrays are not of {size} ranks") from error
 
@@ -147,11 +150,12 @@ class Checkpoint(EventsInMemory):
             event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
             event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
             if not self._ends:
-                atomic.append(self.path, 0, first := begin(self.signature), False)
-                self._ends = [len(first)]
+                atomic.append(self.path, 0, begin(self.signature), lasts=False)
+                self._ends = [len(begin(self.signature))]
             del self._ends[number + 1 :]
             content = record(packed(self._kept(event, self._ends[-1])))
-            atomic.append(self.path, self._ends[-1], content, is_due := monotonic() >= self._due)
+            is_due = monotonic() >= self._due
+            atomic.append(self.path, self._ends[-1], content, lasts=is_due)
             self._due = monotonic() + 1.0 if is_due else self._due
             self._ends.append(self._ends[-1] + len(content))
 
@@ -178,17 +182,16 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
     try:
         with path.open("rb") as stream:
             place, end = stream.seek(start), os.fstat(stream.fileno()).st_size
-            if not place:
+            if place == 0:
                 line, expected = stream.readline(64), begin("").partition(b"\n")[0] + b"\n"
                 if line != expected and expected.startswith(line):  # the first line is unfinished
                     return
                 if (match := HEAD.fullmatch(line)) is None:
                     raise CaseError(f"{path} is damaged: it does not begin as an event file")
                 if int(match[1]) != FORMAT:
-                    raise CaseError(
-                        f"{path} has the checkpoints' format {int(match[1])}, this program reads format {FORMAT}; "
-                        "go on with the program that wrote it, or start again without --resume"
-                    )
+                    formats = f"the checkpoints' format {int(match[1])}, this program reads format {FORMAT}"
+                    cure = "go on with the program that wrote it, or start again without --resume"
+                    raise CaseError(f"{path} has {formats}; {cure}")
                 place = len(line)
             for number in count():
                 if len(prefix := stream.read(PREFIX.size)) < PREFIX.size:
@@ -230,9 +233,8 @@ def unpacked(content: bytes) -> Arrays:
 def refuse_others(directory: Path) -> None:
     """Check that the checkpoint folders in `directory` are missing, or contain only events.  Call on one rank.
 
-    Raises:
-        CaseError: a file or a link has such a name, or a folder has files other than events.
-        OSError: the folder cannot be read.
+    Raises CaseError if a file or a link has such a name, or a folder has files other than events; OSError if a folder
+    cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -240,10 +242,8 @@ def refuse_others(directory: Path) -> None:
             raise CaseError(f"--out {directory}: {folder.name} is a {kind} there, and a run makes that folder")
         paths = list(folder.iterdir()) if folder.is_dir() else []
         if foreign := [path.name for path in paths if path.name != NAME or not path.is_file()]:
-            raise CaseError(
-                f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
-                f"{folder.name}; move it away or choose another folder"
-            )
+            fault = f"no run of this program wrote {folder.name}/{min(foreign)}, and a run removes {folder.name}"
+            raise CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 
 def remove(directory: Path) -> None:

@@ -130,13 +130,12 @@ class FieldFile:
 
     def _bytes(self, part: Any) -> int:
         """Return an upper bound (bytes) for a part's tables and their headers, over all ranks."""
-        return sum(
-            (1 << 12)  # bound of HDF5's table header; the measured size is 0.6 KB
-            + np.dtype(d.dtype).itemsize
-            * int(np.prod(np.shape(getattr(part, name))[1:]))
-            * self._rows[field_layout.rows_of(d)].total
-            for name, d in field_layout.tables(part).items()
-        )
+        size = 0
+        for name, description in field_layout.tables(part).items():
+            row_bytes = np.dtype(description.dtype).itemsize * int(np.prod(np.shape(getattr(part, name))[1:]))
+            # 4 KiB bound HDF5's header of a table; its measured size is 0.6 KB.
+            size += (1 << 12) + row_bytes * self._rows[field_layout.rows_of(description)].total
+        return size
 
     def _write_part(self, group: str, part: Any) -> None:
         """Write the tables of a group; each rank writes its own rows.  Raises ValueError for a wrong number of rows."""
@@ -148,14 +147,15 @@ class FieldFile:
         def arrays() -> dict[str, NDArray[Any]]:
             converted = {n: np.ascontiguousarray(getattr(part, n), np.dtype(d.dtype)) for n, d in described.items()}
             for name, array in converted.items():
-                if len(array) != (count := self._rows[field_layout.rows_of(described[name])].count):
+                count = self._rows[field_layout.rows_of(described[name])].count
+                if len(array) != count:
                     raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
             return converted
 
         for name, array in mpi_errors.agree(self._comm, arrays).items():
-            d = described[name]
-            rows = self._rows[field_layout.rows_of(d)]
-            texts = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
+            description = described[name]
+            rows, unit = self._rows[field_layout.rows_of(description)], description.unit
+            texts = {"meaning": description.meaning, "unit": self._units.get(unit) or unit or PURE_NUMBER}
             self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:

@@ -41,19 +41,19 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 def require_tables(path: Path, state: int | None) -> None:
     """Check links, sizes, layout and numbers of result.h5 in this process; arguments and errors as in `require_own`."""
-    room = {True: 64 * path.stat().st_size, False: path.stat().st_size}  # bytes left for views, and for tables
+    room = {"views": 64 * path.stat().st_size, "tables": path.stat().st_size}  # bytes that may follow
     try:
         with h5py.File(path, "r", locking=False) as file:
             groups = [file["/"]]
-            for group in groups:
+            for group in groups:  # to which the loop adds the groups inside
                 for name in group:
                     entry: Any = group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
-                    if isinstance(entry, h5py.Group) and len(groups) << 10 < room[True]:
+                    if isinstance(entry, h5py.Group) and 1024 * len(groups) < room["views"]:
                         groups.append(entry)
                         continue
                     is_table = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "fiu"
                     if is_table:
-                        room[entry.is_virtual] -= entry.nbytes
+                        room["views" if entry.is_virtual else "tables"] -= entry.nbytes
                         sources = entry.virtual_sources() if entry.is_virtual else ()
                         is_table = not entry.external and {source.file_name for source in sources} <= {"."}
                     if not is_table or min(room.values()) < 0:
@@ -71,30 +71,30 @@ def require_tables(path: Path, state: int | None) -> None:
 
 
 def _require_layout(path: Path, file: Any, state: int | None) -> None:
-    """Compare tables and attributes with `field_layout`, and numbers with RANGES as in `require_own`; CaseError."""
+    """Refuse tables and attributes unlike `field_layout`, and numbers outside RANGES.  Raises as `require_own` does."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
-    counts = {symbol: (*(entry.shape or ()), 0)[0] for symbol, entry in entries.items()}
+    counts = {symbol: entry.shape[0] if entry.shape else 0 for symbol, entry in entries.items()}
     states = [f"state/{number}" for number in range(len(file.get("state", ())))]
     is_spatial = any("axial_stress" in file[name] for name in states)
     parts: dict[str, Any] = {"": field_layout.Header, "mesh": field_layout.MeshPart, "fibre": field_layout.FibrePart}
     of_state = field_layout.SpatialStatePart if is_spatial else field_layout.StatePart
     parts |= {"interface": field_layout.InterfacePart, **dict.fromkeys(states, of_state)}
     for group, part in parts.items():
-        hints, is_read = get_type_hints(part), state is None or group in {*parts} - {*states} | {f"state/{state}"}
-        for name, d in records.descriptions(part).items():
-            attributes, shape = file[f"/{group}"].attrs, d.shape or "()"
-            entry = file[f"{group}/{name}"] if field_layout.rows_of(d) else attributes.get_id(d.name or name)
+        hints, attributes = get_type_hints(part), file[f"/{group}"].attrs
+        is_read = state is None or group == f"state/{state}" or not group.startswith("state/")
+        for name, description in records.descriptions(part).items():
+            is_table, key = bool(field_layout.rows_of(description)), description.name or name
+            entry = file[f"{group}/{name}"] if is_table else attributes.get_id(key)
             is_text = h5py.check_string_dtype(entry.dtype) == ("utf-8", None)
-            shown = f"{'text' if is_text else entry.dtype.newbyteorder('=')} {entry.shape}"
-            expected = f"{ATTRIBUTES.get(hints[name], d.dtype)} ({counts.get(shape[1], shape[1])}{shape[2:]}"
+            actual = f"{'text' if is_text else entry.dtype.newbyteorder('=')} {entry.shape}"
+            shape = description.shape or "()"  # such as (n, 2), whose first letter may stand for a number of rows
+            expected = f"{ATTRIBUTES.get(hints[name], description.dtype)} ({counts.get(shape[1], shape[1])}{shape[2:]}"
             place = f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name}"
-            if shown not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
-                raise CaseError(f"{place} is {shown}, expected {expected}")
-            if is_read and field_layout.rows_of(d):
-                _require_values(place, name, counts, entry)
-            elif is_read and not is_text:
-                _require_values(place, name, counts, attributes[d.name or name])
+            if actual not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
+                raise CaseError(f"{place} is {actual}, expected {expected}")
+            if is_read and not is_text:
+                _require_values(place, name, counts, entry if is_table else attributes[key])
 
 
 def _blocks(table: Any) -> Iterator[Any]:
@@ -106,11 +106,13 @@ def _blocks(table: Any) -> Iterator[Any]:
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
     """Compare a table or attribute with RANGES, a block of rows at a time.  Raises CaseError."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
-    top = np.float64(counts[high] - (high != "f") if isinstance(high, str) else high)
+    if isinstance(high, str):  # fibres count from 1, all others from 0
+        high = counts[high] if high == "f" else counts[high] - 1
     for values in map(np.asarray, _blocks(table) if table.ndim else [table]):
-        is_wrong = ~((np.float64(low) <= values) & (values <= top)) & ~(np.isnan(values) & (name in MAY_BE_NAN))
+        is_in_range = (np.float64(low) <= values) & (values <= np.float64(high))
+        is_wrong = ~is_in_range & ~(np.isnan(values) & (name in MAY_BE_NAN))
         if is_wrong.any():
-            raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {top:g}")
+            raise CaseError(f"{place} has the number {values[is_wrong][0]:g}, expected {low:g} to {high:g}")
 
 
 def _require_mesh(path: Path, file: Any) -> None:

@@ -55,7 +55,7 @@ def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
 def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
     """Return all fibres on rank 0, and no fibre on other ranks."""
     summary = cell.summary
-    body = summary.fibre_bodies[: None if cell.comm.rank == 0 else 0]
+    body = summary.fibre_bodies if cell.comm.rank == 0 else summary.fibre_bodies[:0]
     return FibrePart(
         number=summary.fibre_number(body),
         body=body,
@@ -99,7 +99,7 @@ def state_parts(
     """
     axial_cell = cell.axial or cell
     for number, (label, responses) in enumerate(states.items()):
-        plane, axial = (*responses, None)[:2]
+        plane, axial = responses if len(responses) == 2 else (responses[0], None)
         present, stress = [part for part in responses if part is not None], fields.stress[number]
         shares = [part.shares for part in present if part.shares is not None]
         errors = np.sum(shares or [np.full(stress.shape[1], np.nan)], axis=0)
@@ -143,22 +143,22 @@ def _at_nodes(
 
     If subdomains extend across materials, all interface nodes are bonded.
     """
-    nodes, more = cell.jumps.nodes, [None] * 3 if along is None else [along.displacement, along.traction, along.jump]
-    opening = _vectors(_in_axes(nodes.normal, in_plane.jump), more[2])
-    fibre = _vectors(in_plane.displacement, more[0])[cell.class_nodes[nodes.fibre_node]]
-    none, state = np.zeros(len(nodes.row), np.int8), response.state
-    is_across = cell.summary.across
+    nodes, state, is_across = cell.jumps.nodes, response.state, cell.summary.across
+    u3, traction3, jump3 = (None,) * 3 if along is None else (along.displacement, along.traction, along.jump)
+    opening = _vectors(_in_axes(nodes.normal, in_plane.jump), jump3)
+    fibre = _vectors(in_plane.displacement, u3)[cell.class_nodes[nodes.fibre_node]]
+    zeros = np.zeros(len(nodes.row), np.int8)
     return {
         "displacement": in_plane.displacement,
         "traction": in_plane.traction,
         "jump": in_plane.jump,
-        "traction_vector": _vectors(_in_axes(nodes.normal, in_plane.traction), more[1]),
+        "traction_vector": _vectors(_in_axes(nodes.normal, in_plane.traction), traction3),
         "jump_vector": opening,
         "displacement_fibre": fibre,
         "displacement_matrix": fibre + opening,
-        "status": none if is_across else state.status,
-        "damage": none.astype(float) if is_across else response.damage,
-        "sliding": none if is_across else state.bonds.sliding_signs,
+        "status": zeros if is_across else state.status,
+        "damage": zeros.astype(float) if is_across else response.damage,
+        "sliding": zeros if is_across else state.bonds.sliding_signs,
     }
 
 

@@ -29,7 +29,8 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 
     Successive turning points, which may be ends of the curve, differ by more than `threshold`; flat curves have none.
     """
-    entries, low, high, rises, falls = list[int](), 0, 0, True, True
+    entries, low, high = list[int](), 0, 0  # low, high: extremes since the last turning point
+    rises = falls = True  # the curve may begin with either
     for number, value in enumerate(values):
         low = number if value < values[low] else low
         high = number if value > values[high] else high
@@ -53,46 +54,50 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
     On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
     """
-    leg, damaging = path_curves.legs_of(document), path_curves.damaging_leg(document, ("broke", "softened"))
-    start, before = int((leg < (damaging or 0)).sum()), int((leg <= (damaging or np.inf)).sum())
-    points = document["path"][: int((leg <= (path_curves.damaging_leg(document) or np.inf)).sum())]
+    leg, breaking = path_curves.legs_of(document), path_curves.damaging_leg(document)
+    points = document["path"] if breaking is None else document["path"][: np.count_nonzero(leg <= breaking)]
+    start, stop = 0, len(leg)  # all points, or the points of the leg where damage begins
+    if (damaging := path_curves.damaging_leg(document, ("broke", "softened"))) is not None:
+        start, stop = np.count_nonzero(leg < damaging), np.count_nonzero(leg <= damaging)
     component = path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
     strain = np.array([point["strain"][component] for point in points], float) + 0.0
     stresses = path_curves.stresses(document)[: len(points)]
     stress = stresses[:, component] + 0.0
-    number, curve, broke = np.arange(len(stress)), stress, np.array([point["broke"] for point in points])
-    if path_curves.is_proportional(document):
+    broke = np.array([point["broke"] for point in points])
+    number, curve = np.arange(len(stress)), stress  # values of the leading stress, each with its point
+    if path_curves.is_proportional(document):  # two corners of each branch; of the first, only its end
         number = np.repeat(path_curves.rising_points(points), 2)[1:]
         curve = path_curves.load_controlled(points)[1:, component]
         curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)
     size = np.abs(curve)
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
-        size = np.clip(curve * np.sign(stress[start + np.abs(stress[start:before]).argmax()]), 0.0, None)
+        size = np.clip(curve * np.sign(stress[start + np.abs(stress[start:stop]).argmax()]), 0.0, None)
         size[:start] = 0.0
     turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
     breaks = [(a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
-    share = np.inf if "unfinished" in document or broke[:start].any() else LEAST_FALL
-    falls = [(size[a] - size[b], a, b) for a, b in breaks if a == size.argmax() or 1 - size[b] / size[a] >= share]
+    threshold = np.inf if "unfinished" in document or broke[:start].any() else LEAST_FALL
+    falls = [(size[a] - size[b], a, b) for a, b in breaks if a == size.argmax() or 1 - size[b] / size[a] >= threshold]
     _, top, valley = max(falls, default=(0.0, len(size), None))
     event = int(number[size[: top + 1].argmax()])
-    names = [names[component] for names in voigt.voigt_names(len(points[0]["stress"]))]
-    entries: dict[str, Any] = {}
-    if has_peak := bool(stresses.any()):
-        entries = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
+    strains, names = voigt.voigt_names(len(points[0]["stress"]))
+    entries: dict[str, Any] = {"strain_name": strains[component], "stress_name": names[component]}
+    if stresses.any():
+        entries |= {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
         entries["dissipated"] = points[event].get("dissipated", 0.0)
     for title, count in (("first_softening", "softened"), ("first_break", "broke")):
-        first = next((number for number, point in enumerate(points) if point.get(count)), None)
+        first = next((k for k, point in enumerate(points) if point.get(count)), None)
         if first is not None:
             numbers = {"stress": float(stress[first]), "strain": float(strain[first]), "event": first}
             entries |= {f"{title}_{name}": value for name, value in numbers.items()}
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
     is_cut_off = valley is None and document["path"][-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
-    entries |= {"so_far": True} if has_peak and (is_cut_off or "unfinished" in document) else {}
+    if stresses.any() and (is_cut_off or "unfinished" in document):
+        entries["so_far"] = True
     # The fibres and directions of the bonds follow from the states alone.
     bonds = {name: value for name, value in document.get("peak", {}).items() if name.endswith(("fibre", "angle"))}
-    return {"strain_name": names[0], "stress_name": names[1], **entries, **bonds}
+    return entries | bonds
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
@@ -126,7 +131,7 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
     `numbers` are interpolated linearly, from 0 on.
     """
     lines, table = list[str](), path_curves.table_of([document["path"][number] for number in numbers])
-    before = ", before the largest stress of the path, which" if "event" in peak else "; the path"
+    subject = ", before the largest stress of the path, which" if "event" in peak else "; the path"
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
@@ -135,10 +140,8 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
             names = ("temperature",) if is_thermal else (peak["stress_name"], peak["strain_name"])
             ends = slice(k - 1, k + 1)
             places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *table[name]][ends]):.4g}" for name in names]
-            lines.append(
-                f"[material.{phase['phase']}] strength: the utilisation reaches 1 at about {', '.join(places)}{before} "
-                "takes the phase as elastic beyond"
-            )
+            passed = f"the utilisation reaches 1 at about {', '.join(places)}"
+            lines.append(f"[material.{phase['phase']}] strength: {passed}{subject} takes the phase as elastic beyond")
     return lines
 
 
@@ -167,15 +170,15 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
     """
     if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
         return list(range(len(points)))
-    ends, around = {0, len(points) - 1}, drops(points, legs)
+    ends, falls = {0, len(points) - 1}, drops(points, legs)
     if isinstance(states, str):
-        return sorted(ends.union(marked, *(drop[1:] for drop in around)))
+        return sorted(ends.union(marked, *((before, after) for _, before, after in falls)))
     chosen = ends.union(marked) if len(ends.union(marked)) <= states else ends
     room = len(chosen) + (states - len(chosen)) // 2
-    for _, *pair in sorted(around, key=lambda drop: -drop[0]):
+    for _, *pair in sorted(falls, key=lambda drop: -drop[0]):
         if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
-    # Each further point divides the widest remaining gap.
+    # Each further point divides the widest remaining gap: minus its width, number of parts, ends.
     gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(sorted(chosen))]
     heapify(gaps)
     for _ in range(states - len(chosen)):
@@ -192,24 +195,26 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
     at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
-    size, length = _norm(stress, 2.0), _norm(strain, 0.5)
-    least = LEAST_DROP * (largest := float(size.max()))
+    size = _norm(stress, 2.0)
+    largest = float(size.max())
+    least = LEAST_DROP * largest
     entries = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
-    per_strain = largest / (float(length.max()) or 1.0)
+    scaled = largest / (float(_norm(strain, 0.5).max()) or 1.0) * strain  # strains as stresses
     load = np.array([point["load_factor"] for point in points])
     of_first_leg = int((load * legs <= 1.0 + path_curves.SAME_LOAD).sum()) if legs else 0
     # Branches are rays through zero: stress and strain after a drop are scaled to the load before the drop.
-    scaled, later = per_strain * strain, list[Drop]()
+    jumps = list[Drop]()
     for a, b in pairwise(path_curves.rising_points(points[:of_first_leg]).tolist()):
-        scale = load[a] / load[b]
-        jump = _norm((scaled[b] * scale - scaled[a])[None], 0.5)[0]
-        later += [(max(float(size[a] - size[b] * scale), float(jump)), a, b)] * (b > a + 1)
+        if b > a + 1:
+            scale = load[a] / load[b]
+            jump = float(_norm((scaled[b] * scale - scaled[a])[None], 0.5)[0])
+            jumps.append((max(float(size[a] - size[b] * scale), jump), a, b))
     # On later legs the strain jumps across all points at one load, between which bonds break.
     starts = of_first_leg + np.flatnonzero(np.abs(np.diff(load[of_first_leg:], prepend=-1.0)) > path_curves.SAME_LOAD)
     for a, b in pairwise([*starts.tolist(), len(load)]):
         jump = float(_norm((scaled[b - 1] - scaled[a])[None], 0.5)[0])
-        later.append((jump, a, min(b, len(load) - 1)))
-    return entries + [drop for drop in later if drop[0] > least]
+        jumps.append((jump, a, min(b, len(load) - 1)))
+    return entries + [drop for drop in jumps if drop[0] > least]
 
 
 def _norm(values: Float, shear: float) -> Float:
@@ -220,7 +225,7 @@ def _norm(values: Float, shear: float) -> Float:
 
 
 def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Choose at most `rows` points of the path, or of the points `among` (in ascending order).
+    """Choose at most `rows`, at least 2, points of the path, or of the points `among` (in ascending order).
 
     The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
     further points at evenly spaced numbers of broken bonds.
@@ -230,9 +235,9 @@ def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | Non
     if len(numbers) <= rows:
         return [int(number) for number in numbers]
     fixed = {0, len(numbers) - 1}
-    of_events = document["case"]["path"]["method"] == "events"
-    around = drops(points, path_curves.legs(document) if of_events else 0)
-    for group in (marks(document), max(around, default=())[1:], path_curves.ends_of_legs(document)):
+    by_events = document["case"]["path"]["method"] == "events"
+    _, *deepest = max(drops(points, path_curves.legs(document) if by_events else 0), default=(0.0,))
+    for group in (marks(document), deepest, path_curves.ends_of_legs(document)):
         places = np.flatnonzero(np.isin(numbers, list(group))).tolist()
         fixed = fixed.union(places) if len(fixed.union(places)) <= rows else fixed
     broken = np.cumsum([point["broke"] for point in points])[numbers]

@@ -66,16 +66,16 @@ def usable(directory: Path) -> None:
 def refuse_files_of_others(directory: Path) -> None:
     """Check that a run may replace the files in `directory`.  Call on one rank.
 
-    Raises:
-        CaseError: a folder, a broken link or a foreign file has the name of a result file, or the folder is unreadable.
+    Raises CaseError if a folder, a broken link or a foreign file has the name of a result file, or the folder is
+    unreadable.
     """
     if not directory.is_dir():
         return
     try:
         paths = [p for p in sorted(directory.iterdir()) if p.name in SIGNS or RESULT_FILE.fullmatch(p.name)]
         for path in paths:
-            kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
-            if kind:
+            if path.is_dir() or not path.exists():
+                kind = "a folder there" if path.is_dir() else "a link there that leads nowhere"
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         if any(path.name.startswith("checkpoint") for path in directory.iterdir()):
             from feti_homog.results import checkpoints  # only paths have checkpoints
@@ -83,7 +83,7 @@ def refuse_files_of_others(directory: Path) -> None:
             checkpoints.refuse_others(directory)
         signs = [path for path in paths if path.name in SIGNS]
         # Without any sign of a run, all files that are not empty are foreign.
-        foreign_files = [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
+        foreign_files = [p for p in signs or paths if p.stat().st_size and (not signs or not _is_own(p))]
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
     if foreign_files:
@@ -93,35 +93,34 @@ def refuse_files_of_others(directory: Path) -> None:
 def replaced(directory: Path, case: Case) -> str:
     """Return a warning if a run replaces an unreadable result, or one of another case; else "".  Call on one rank.
 
-    Raises:
-        CaseError: the folder has events of this case, from which a run can go on.
+    Raises CaseError if the folder has events of this case, from which a run can go on.
     """
-    path, are_own, line = directory / "checkpoint/events", list[bool](), ""
-    if not path.is_file() and not os.path.lexists(directory / result_json.NAME):
+    path, has_result = directory / "checkpoint/events", os.path.lexists(directory / result_json.NAME)
+    if not path.is_file() and not has_result:
         return ""
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
+    are_own, change = list[bool](), ""  # are_own: of the signature, then of each event
     try:
         signature = b"case %s," % case.digest(False).encode()  # begins the first record
-        are_own += [content.startswith(signature) for _, content in checkpoints.records(path)] if path.is_file() else []
-        if len(are_own) > 1 or os.path.lexists(directory / result_json.NAME):
+        if path.is_file():
+            are_own = [content.startswith(signature) for _, content in checkpoints.records(path)]
+        if len(are_own) > 1 or has_result:
             stored = latest(directory)
             title = f"{wording.toml_value(stored['case']['name'])} ({stored['date']}, {stored['status']})"
-            line = "" if stored["digest"] == case.digest() else f"replaces the result of case {title}"
+            change = "" if stored["digest"] == case.digest() else f"replaces the result of case {title}"
     except (FetiHomogError, LookupError, TypeError) as error:
-        line = f"replaces a result that cannot be read: {error}"
+        change = f"replaces a result that cannot be read: {error}"
     if len(are_own) > 1 and are_own[0]:
         way = f"--resume goes on from them; remove {path.parent} to start again"
         raise CaseError(f"--out {directory}: it holds {len(are_own) - 1} events of this path: {way}")
-    return line and f"warning: {directory}: this run {line}"
+    return f"warning: {directory}: this run {change}" if change else ""
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
     """Return the error for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
-    return CaseError(
-        f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
-        "move it away or choose another folder"
-    )
+    fault = f"no {kind} of this program wrote {name}, and this one would replace it"
+    return CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 
 def _is_own(path: Path) -> bool:
@@ -149,11 +148,11 @@ def latest(directory: Path) -> dict[str, Any]:
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
     path = directory / checkpoints.FOLDER / checkpoints.NAME
-    records = checkpoints.records(path) if path.is_file() else ()
-    first, *events = [content for _, content in records] or [b""]
+    contents = [content for _, content in checkpoints.records(path)] if path.is_file() else []
+    signature, events = (contents[0], contents[1:]) if contents else (b"", [])
     stored = result_json.read(directory) if not events or os.path.lexists(directory / result_json.NAME) else {}
     try:
-        opening = result_json.loads(first.decode().partition("\n")[2] or "{}")
+        opening = result_json.loads(signature.decode().partition("\n")[2] or "{}")
         if not events or (stored.get("digest") == opening["digest"] and len(stored.get("path", ())) >= len(events)):
             return stored
         points = [result_json.loads(str(checkpoints.unpacked(event)["point"])) for event in events]
@@ -173,20 +172,17 @@ def result_folder(directory: Path) -> Path:
     names = [name for name in STUDIES if os.path.exists(directory / name)]
     if os.path.exists(directory / result_json.NAME) or not names:
         return directory
-    if names == [STUDIES[0]]:
-        raise CaseError(
-            f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
-            f"`feti-homog collect {directory}` makes tables of all cases"
-        )
+    if names == ["sweep.json"]:
+        expected = f"expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep"
+        raise CaseError(f"{directory}: {expected}; `feti-homog collect {directory}` makes tables of all cases")
     names += ["fit.png"] if "fit.json" in names else []
     raise CaseError(f"{directory} has a study: see {', '.join(names)}")
 
 
 def refuse_begun(directory: Path) -> None:
-    """Refuse the folder of a begun run that has no result.json yet.  Call on one rank.
+    """Raise CaseError for the folder of a begun run that has no result.json yet.  Call on one rank.
 
-    Raises:
-        CaseError: the run still works, or ended early; for a path, the message gives the number of points and the load.
+    The run still works, or ended early; for a path, the message gives the number of points and the load.
     """
     is_begun = any(os.path.lexists(directory / name) for name in (LOCK, "checkpoint"))
     if not is_begun or os.path.lexists(directory / result_json.NAME):
@@ -205,9 +201,8 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     Removes unfinished files from earlier runs, and at the end new folders that stayed empty.  On a file system without
     locks, `say` gets a warning and the run continues without a lock.
 
-    Raises:
-        CaseError: the folder cannot be made, or another run has locked it.
-        FetiHomogError: the lock file cannot be created or locked.
+    Raises CaseError if the folder cannot be made, or another run has locked it; FetiHomogError if the lock file cannot
+    be created or locked.
     """
     lock = file_locks.Lock(directory / LOCK)
 

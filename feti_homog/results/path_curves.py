@@ -43,24 +43,25 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
 
 def changed_components(document: Document, leg: int | None = None) -> list[int]:
     """Return the indices of the components that change at waypoint `leg`, from 1, or by default at any waypoint."""
-    pairs, matches = voigt.plane_state_of(document).components, set[int]()
+    pairs, changed = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for number, target in enumerate(targets(document), start=1):
         for component, names in enumerate(pairs):
-            values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
-            matches |= {component} if values[0] != values[1] and leg in (None, number) else set()
+            old, new = ({name: load[name] for name in names if load.get(name)} for load in (before, target))
+            if old != new and leg in (None, number):
+                changed.add(component)
         before = target
-    return sorted(matches)
+    return sorted(changed)
 
 
 def stresses(document: Document) -> Float:
-    """Return the stresses (n, c) of the points, without noise."""
+    """Return the stresses (n, c) of the points, 0 where they are solver noise."""
     stress = np.array([point["stress"] for point in document["path"]], float)
     return np.where(np.abs(stress) > noise(document), stress, 0.0)
 
 
 def noise(document: Document) -> float:
-    """Return the solver's noise: `ZERO` times the largest stress, or the largest strain times the least modulus."""
+    """Return the solver's noise: `ZERO` times the larger of largest stress, and largest strain times least modulus."""
     strain, stress = (np.abs([point[name] for point in document["path"]]).max() for name in ("strain", "stress"))
     named = [constant for phase in document["case"].get("material", {}).values() for constant in phase.items()]
     moduli = [np.max(value) for name, value in named if value and name.startswith(("young", "E", "G", "stiffness"))]
@@ -87,7 +88,7 @@ def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int 
 
     A point has damage if one of the entries `counts`, such as `broke`, is positive.
     """
-    leg, damaged = legs_of(document), [any(map(point.get, counts)) for point in document["path"]]
+    leg, damaged = legs_of(document), np.array([any(map(point.get, counts)) for point in document["path"]])
     under_stress = np.isin(leg, leg[stresses(document).any(axis=1)])
     return next((int(number) for number in leg[damaged & under_stress]), None)
 
@@ -98,9 +99,9 @@ def abscissa(document: Document) -> tuple[str, Float]:
     If this strain is held at zero, or all waypoints change the temperature alone, return the temperature instead.
     """
     table, strains = table_of(document["path"]), voigt.voigt_names(len(document["path"][0]["strain"]))[0]
-    name, largest = strains[leading_component(document)], max(np.abs(table[strain]).max() for strain in strains)
-    is_held = np.abs(table[name]).max() <= ZERO * largest or not changed_components(document)
-    name = load_sections.TEMPERATURE if is_held and table[load_sections.TEMPERATURE].any() else name
+    leading, largest = strains[leading_component(document)], max(np.abs(table[strain]).max() for strain in strains)
+    is_held = np.abs(table[leading]).max() <= ZERO * largest or not changed_components(document)
+    name = load_sections.TEMPERATURE if is_held and table[load_sections.TEMPERATURE].any() else leading
     return name, table[name]
 
 
@@ -126,8 +127,8 @@ def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
 
 def legs_of(document: Document) -> Float:
     """Return the leg (n,) of each point, counted from 1."""
-    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
-    return np.asarray(np.ceil(position - SAME_LOAD * count).clip(1))
+    position = legs(document) * np.array([point["load_factor"] for point in document["path"]])
+    return np.asarray(np.ceil(position - SAME_LOAD * legs(document)).clip(1))
 
 
 def components_above(share: float, values: Float) -> list[int]:
@@ -165,9 +166,10 @@ def first_leg(document: Document) -> int:
 
 def ends_of_legs(document: Document) -> list[int]:
     """Return the number of the last point at each waypoint that the path reaches."""
-    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
-    matches = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
-    return [int(numbers[-1]) for numbers in matches if len(numbers)]
+    count = legs(document)
+    position = count * np.array([point["load_factor"] for point in document["path"]])
+    at_ends = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
+    return [int(numbers[-1]) for numbers in at_ends if len(numbers)]
 
 
 def is_proportional(document: Document) -> bool:

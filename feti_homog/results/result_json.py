@@ -204,8 +204,9 @@ def loads(text: str) -> dict[str, Any]:
         if not isinstance(document, dict):
             raise ValueError("it is damaged: no table of keys and values")
         if KEY not in document:
-            *rest, (_, last) = document.items() if document else [("", None)]
-            if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
+            last_key, last = next(reversed(document.items()), ("", None))
+            rest = {key: value for key, value in document.items() if key != last_key}
+            if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(rest)):
                 raise ValueError("it is damaged: the key of its checksum has another name")
             return document
         stored = document.pop(KEY)
@@ -242,9 +243,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
     """Check a file against its seal; `block` is as in `seal`.  Call on one rank.
 
-    Raises:
-        CaseError: size or checksum differ.
-        FetiHomogError: the file cannot be read.
+    Raises CaseError if size or checksum differ, FetiHomogError if the file cannot be read.
     """
     with atomic.file_errors("read", path):
         size = os.stat(path).st_size

@@ -59,7 +59,8 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
         CaseError: result.h5 is missing or damaged, or has no such state.
         FetiHomogError: result.h5 has no read permission.
     """
-    field_guard.require_own(path := Path(out) / field_file.NAME, number)
+    path = Path(out) / field_file.NAME
+    field_guard.require_own(path, number)
     with h5py.File(path, "r", locking=False) as file:
         count = len(file.get("state", ()))
         if not 0 <= number < count:
@@ -70,15 +71,16 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
 def cell_state(file: Any, state: int) -> ViewedState:
     """Read a cell state from an open result.h5, as `read_state` does."""
     group = file[f"state/{state}"]
-    more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
-    nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
-    points, triangles, strain = file["mesh/points"][()], file["mesh/triangles"][()], group.attrs["strain"]
+    is_spatial, strain = AXIAL_DISPLACEMENT in group, group.attrs["strain"]
+    nodes = _tables(file, state, xdmf.CELL_NODES)
+    elements = _tables(file, state, xdmf.CELL_ELEMENTS | (xdmf.SPATIAL_ELEMENTS if is_spatial else {}))
+    points, triangles = file["mesh/points"][()], file["mesh/triangles"][()]
     # The macroscopic strain causes the displacement H x, in the plane and along the fibres.
-    along = strain[[4, 3]] if more else np.zeros(2)
+    along = strain[[4, 3]] if is_spatial else np.zeros(2)  # gamma13, gamma23
     gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
     nodes["fluctuation"] = nodes["displacement"] - (points - points.min(axis=0)) @ gradient.T
     in_plane = group["stress"][()]
-    if more:
+    if is_spatial:
         E33 = np.full(len(in_plane), strain[2])
     else:  # from the constitutive laws, in plane strain and plane stress
         rules = constitutive_law.out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
@@ -88,22 +90,21 @@ def cell_state(file: Any, state: int) -> ViewedState:
     gamma13, gamma23 = assembly.element_strain(points, triangles, displacement[:, 2:], AXIAL).T
     E12, E13, E23 = gamma12 / 2, gamma13 / 2, gamma23 / 2
     elements["strain"] = np.stack([E11, E12, E13, E12, E22, E23, E13, E23, E33], axis=1)
-    shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
+    shears = group["axial_stress"][()] if is_spatial else np.zeros((len(triangles), 2))
     S33 = elements["S33"]
     elements["von_mises"] = voigt.spatial_von_mises(in_plane, S33, shears)
-    principal = voigt.spatial_principal(in_plane, S33, shears) if more else voigt.principal(in_plane, S33)
+    principal = voigt.spatial_principal(in_plane, S33, shears) if is_spatial else voigt.principal(in_plane, S33)
     elements |= {f"principal_{k + 1}": column for k, column in enumerate(principal.T)}
-    means, points = xdmf.cell_means(group.attrs), np.pad(points, [(0, 0), (0, 1)])
-    return ViewedState(points, triangles, nodes, elements, means, str(group.attrs["label"]))
+    means, in_space = xdmf.cell_means(group.attrs), np.pad(points, [(0, 0), (0, 1)])
+    return ViewedState(in_space, triangles, nodes, elements, means, str(group.attrs["label"]))
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
     """Read a state at the interface nodes: displacements of both faces, tractions, jumps, bond states, geometry."""
     group = file[f"state/{state}"]
-    more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
-    nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
+    places = xdmf.INTERFACE_POINTS | (xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {})
+    nodes, means = _tables(file, state, places), xdmf.cell_means(group.attrs)
     points = np.pad(file["interface/points"][()], [(0, 0), (0, 1)])
-    means = xdmf.cell_means(group.attrs)
     return ViewedState(points, file["interface/vertex"][()], nodes, {}, means, str(group.attrs["label"]))
 
 
@@ -141,17 +142,17 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
             collection = ET.Element("VTKFile", type="Collection", version="0.1")
             listed = ET.SubElement(collection, "Collection")
             for number in range(len(file.get("state", ()))):
-                path = directory / f"{name}_{number:04d}.vtu"
-                paths.append(atomic.replace(path, ET.ElementTree(_grid(read(file, number))).write))
-                ET.SubElement(listed, "DataSet", timestep=str(number), file=path.name)
+                target = directory / f"{name}_{number:04d}.vtu"
+                paths.append(atomic.replace(target, ET.ElementTree(_grid(read(file, number))).write))
+                ET.SubElement(listed, "DataSet", timestep=str(number), file=target.name)
             paths.append(atomic.replace(directory / f"{name}.pvd", ET.ElementTree(collection).write))
         return paths
 
 
 def _grid(state: ViewedState) -> ET.Element:
     """Convert a state into VTK's XML, with arrays in base64."""
-    form = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
-    root = ET.Element("VTKFile", form)
+    header = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    root = ET.Element("VTKFile", header)
     m, columns = state.cells.shape
     sizes = {"NumberOfPoints": str(len(state.points)), "NumberOfCells": str(m)}
     grid = ET.SubElement(root, "UnstructuredGrid")

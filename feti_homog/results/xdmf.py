@@ -61,10 +61,8 @@ def write(directory: Path) -> list[Path]:
     """Write the XDMF files for `directory`/result.h5; return their paths.  Call on one rank.
 
     result.xdmf has the fields on nodes and elements of the cell.  A cell with interface nodes also gets interface.xdmf,
-    with the fields at interface points.  Each file has one temporal collection, with state numbers as times.
-
-    Raises:
-        FetiHomogError: result.h5 cannot be read or a file cannot be written.
+    with the fields at interface points.  Each file has one temporal collection, with state numbers as times.  Raises
+    FetiHomogError if result.h5 cannot be read or a file cannot be written.
     """
     h5, paths = Path(directory) / field_file.NAME, list[Path]()
     with atomic.file_errors("write", Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
@@ -107,8 +105,8 @@ def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
     """
     names, strain, stress = ["load_factor"], attributes["strain"], attributes["stress"]
     if "temperature" in attributes:
-        names, stress = [*names, "temperature"], stress[TENSOR]
-        strain = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)
+        names.append("temperature")
+        strain, stress = strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5), stress[TENSOR]
     numbers = {name: np.array([[attributes[name]]], float) for name in names}
     return numbers | {"mean_strain": strain[None], "mean_stress": stress[None]}
 

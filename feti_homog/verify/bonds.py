@@ -158,9 +158,10 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
     if sections and (len(sections) > 1 or (strength != 1).any()):
         pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
         for name, default in NUMBERS.items():
-            power = 1 if name.endswith("strength") else 2 if name.endswith("toughness") else 0
-            numbers = [[table[key] for key in (name, default) if table.get(key) is not None] for table in sections]
-            section[name] = np.array([float((values or [np.inf])[0]) for values in numbers])[pair] * factor**power
+            power = {"strength": 1, "toughness": 2}.get(name.rpartition("_")[2], 0)
+            entries = [table.get(default) if table.get(name) is None else table[name] for table in sections]
+            numbers = np.array([np.inf if entry is None else float(entry) for entry in entries])
+            section[name] = numbers[pair] * factor**power
     return law_of(section if damage is None else section | {"damage": damage[nodes]})
 
 

@@ -83,7 +83,7 @@ def _verified(directory: Path) -> Certificate:
             laws_of_numbers(findings, cell, states)
             kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
             title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
-            status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
+            status = "the run reports: " + document.hint("status") + (f": {'; '.join(faults)}" if faults else "")
             return Certificate(findings.worst(), title, status, unchecked(document))
     except OSError as error:
         raise input_files.unreadable(directory / FIELDS, error) from error
@@ -128,9 +128,9 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
     if "path" in document:
         points = document["path"]
         if all(0 <= state.point < len(points) for state in states):  # else `check_loads` reports the state
-            for check in (check_breaks, check_strength, check_stored):
+            check_work = check_heat if "friction_heat" in points[0] else check_losses
+            for check in (check_breaks, check_strength, check_stored, check_work):
                 check(findings, cell, states)
-            (check_heat if "friction_heat" in points[0] else check_losses)(findings, cell, states)
     else:
         for number, table in enumerate([document, *cell.files.points], start=-1):
             if (tips := table.get("tips")) is not None:

@@ -99,7 +99,8 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
     """Check the closed forms of the conductivity and, without conductances, that it is within Wiener's bounds."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
-    share, (axial, across) = cell.fractions, (cell.stiffnesses[:, place, place] for place in GRADIENT[::-2])
+    share, (x1, _, x3) = cell.fractions, GRADIENT
+    axial, across = cell.stiffnesses[:, x3, x3], cell.stiffnesses[:, x1, x1]
     limits = np.array([1 / (share @ (1 / across)), share @ across])
     bounds = [forms["wiener"], forms["hashin_shtrikman"]]
     findings.compare("bounds", forms["axial"], share @ axial, axial.max(), "conductivity_estimates.axial")

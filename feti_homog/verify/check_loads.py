@@ -41,19 +41,19 @@ def targets(case: Document) -> list[Prescribed]:
 
     A component that a load omits keeps its previous value and kind; initially stresses and temperature are 0.
     """
-    v = 6 if case["analysis"]["plane"] == "generalized" else 3
-    n = v + (v > 3)
+    v, n = (6, 7) if case["analysis"]["plane"] == "generalized" else (3, 3)
     strains, stresses = NAMES[v]
     places = {name: (k, False) for k, name in enumerate([*strains, TEMPERATURE][:n])}
     places |= {name: (k, True) for k, name in enumerate(stresses)}
     values, by_stress, loads = np.zeros(n), np.arange(n) < v, []
     path = case.get("path", {})
     single = [path[name] for name in ("strain", "to") if path.get(name)]
-    for load in [case["load"]["to"]] if "load" in case else path.get("waypoints") or single:
+    waypoints = [case["load"]["to"]] if "load" in case else path.get("waypoints") or single
+    for load in waypoints:
         values, by_stress = values.copy(), by_stress.copy()
         for name, value in (load if isinstance(load, Mapping) else dict(zip(strains, load, strict=True))).items():
-            place, by_stress[places[name][0]] = places[name]
-            values[place] = value
+            place, is_stress = places[name]
+            values[place], by_stress[place] = value, is_stress
         loads.append(Prescribed(values, by_stress))
     return loads
 
@@ -151,7 +151,8 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
         for number, (load, entries) in enumerate(rows):
             _check_load(findings, load, entries, scales, f"path[{number}]")
         key = cell.files.case["output"]["states"]
-        count = min(key, count) if isinstance(key, int) else count if key == "all" else len(numbers)
+        most = count if key == "all" else len(numbers)
+        count = min(key, count) if isinstance(key, int) else most
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
         pairs = list(zip(states, rows, strict=False))
@@ -165,12 +166,12 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Ro
 
 
 def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales: Sequence[float], place: str) -> None:
-    """Check prescribed strains and stresses, and the temperature, relative to `scales`."""
+    """Check prescribed strains, stresses and the temperature, each relative to one of the three `scales`."""
     strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
-    values, by_stress = load.values[:v], load.by_stress[:v]
-    findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
-    findings.record("stress load", np.abs(stress - values)[by_stress] / scales[1], f"{place}, stress")
-    findings.compare("load", numbers.get(TEMPERATURE, 0.0), load.values[v:].sum(), scales[2], f"{place}, temperature")
+    values, by_stress, (of_strain, of_stress, of_heat) = load.values[:v], load.by_stress[:v], scales
+    findings.record("load", np.abs(strain - values)[~by_stress] / of_strain, f"{place}, strain")
+    findings.record("stress load", np.abs(stress - values)[by_stress] / of_stress, f"{place}, stress")
+    findings.compare("load", numbers.get(TEMPERATURE, 0.0), load.values[v:].sum(), of_heat, f"{place}, temperature")
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
@@ -209,9 +210,8 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(nodes.length), 1.0, place)
-        names = {"debonded_length"} if number in points_with_state else set()
-        names |= {"debonded_shares"} if sections > 1 else set()
-        missing = sorted(names.difference(point))
+        needed = {"debonded_length": number in points_with_state, "debonded_shares": sections > 1}
+        missing = [name for name, is_needed in needed.items() if is_needed and name not in point]
         findings.require("tables", not missing, f"point {number}, {', '.join(missing)}")
 
 
@@ -238,7 +238,7 @@ def rows_of(cell: DiscreteCell) -> Rows:
             continue
         columns = np.array(table[f"{stiffness}{suffix}"])
         v = len(columns)
-        n = v + (v > 3)
+        n = 7 if v == 6 else v  # with the temperature
         if f"thermal_stress{suffix}" in table:
             columns = np.column_stack([columns, table[f"thermal_stress{suffix}"]])
         for k in [k for k in UNIT_LOADS[v] if k < columns.shape[1]]:

@@ -66,8 +66,8 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     """Check places, bodies, sections, normals, lengths and strengths of interface nodes."""
     rows, faces, at = cell.files.interface, cell.faces, "interface node {}".format
-    nodes, k = cell.files.document["solver"]["interface_nodes"], len(rows.points)
-    findings.compare("cell", nodes, k, 1.0, "solver.interface_nodes")
+    count = cell.files.document["solver"]["interface_nodes"]
+    findings.compare("cell", count, len(rows.points), 1.0, "solver.interface_nodes")
     # Strengths scatter by Weibull's distribution with mean 1, except in a table of fibres.
     strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
     if cell.files.case["cell"]["geometry"] != "table":
@@ -78,8 +78,8 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
             expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
         findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
     findings.record("interface", faces.distance / cell.files.size.max(), at)
-    count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
-    wrong = np.flatnonzero(count != (faces.pair >= 0))
+    rows_at = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
+    wrong = np.flatnonzero(rows_at != (faces.pair >= 0))
     first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
     text = f"{len(wrong)} places without exactly one interface node, the first at mesh node {first}"
     findings.require("interface", not len(wrong), text)
@@ -90,9 +90,10 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     part[faces.row[on_fibre]] = cell.constituent[nodes.subdomain[on_fibre]]
     alike = []
     for labels in (part, fibre, part * (int(fibre.max(initial=0)) + 1) + fibre):
-        _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
-        alike.append(count[inverse.ravel()])
-    findings.record("interface", np.maximum(alike[0], alike[1]) - alike[2], at)
+        _, inverse, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+        alike.append(sizes[inverse.ravel()])
+    by_mesh, by_label, by_both = alike
+    findings.record("interface", np.maximum(by_mesh, by_label) - by_both, at)
     misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
     findings.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
@@ -117,8 +118,8 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     angle = np.radians([fibre.hint("angle", 0.0) for fibre in fibres])
     thickness = np.array([fibre.hint("coating", np.nan) for fibre in fibres], float)
     turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
-    of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
-    frames = turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None]
+    fibre, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
+    frames = turn[fibre] * (np.array(axes, float).reshape(-1, 2)[fibre] + coats[:, None])[:, None]
     # Nodes of a side that are no interface nodes have row -1, and get no share.
     row, is_quadratic, k = cell.inner_rows, nodes.shape[1] == 3, len(rows.length)
     points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)
@@ -200,7 +201,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre"
     G, opening, shear, psi, length, angle, number = (np.array(tips[name]) for name in names)
-    pair, third = (np.array(tips.get(name, [k] * len(G))) for name, k in (("interface", 1), ("G_III", 0.0)))
+    pair, third = np.array(tips.get("interface", [1] * len(G))), np.array(tips.get("G_III", [0.0] * len(G)))
     loads = [*NAMES[6 if "G_III" in tips else 3][0], "strain", "load"]
     tips.leaves_open("G", "G_I", "G_II", "G_III")
     findings.compare("rates", G, opening + shear + third, np.abs(G), at)
@@ -213,7 +214,8 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
         radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
-        findings.record("rates", max(off + (chords.min(initial=np.inf) > ROUNDING * radius) - ROUNDING, 0.0), at(t))
+        apart = 1.0 if chords.min(initial=np.inf) > ROUNDING * radius else 0.0  # no bond is at the tip
+        findings.record("rates", max(off + apart - ROUNDING, 0.0), at(t))
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:

@@ -31,13 +31,14 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
     has_toughness, scale = law_at(cell.files).has_toughness, float(np.finfo(float).tiny)
     if has_toughness:
         scale = max(points[-1]["fracture_energy"], scale)
-        findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
+        first = np.where(by_events, points[0]["fracture_energy"] / scale, 0.0)
+        findings.record("energy", first, "path[0].fracture_energy")
     for state, after in pairwise(states):
         bonded, bonded_after = (numbers.status == Status.BONDED for numbers in (state, after))
         damaged = after.damage > state.damage
         between = points[state.point : after.point] if by_events else points[state.point + 1 : after.point + 1]
-        softened, limit = np.count_nonzero(bonded_after & damaged), sum(point.get("softened", 0) for point in between)
-        off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
+        softened, stated = np.count_nonzero(bonded_after & damaged), sum(point.get("softened", 0) for point in between)
+        off = abs(softened - stated) if len(between) == 1 else max(softened - stated, 0)  # a bond may soften again
         findings.record("breaks", off, f"{state.name}, bonds that softened")
         findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
         findings.record("breaks", np.count_nonzero(bonded_after & ~bonded), f"{after.name}, bonds that healed")
@@ -46,10 +47,10 @@ def check_breaks(findings: Findings, cell: DiscreteCell, states: States) -> None
         if has_toughness:
             law, damages = law_at(cell.files, damaged), (state.damage[damaged], after.damage[damaged])
             if by_events and after.point == state.point + 1:
-                bounds = (law.absorbed(law.mode(state.traction[damaged]), *damages),) * 2
+                lower = upper = law.absorbed(law.mode(state.traction[damaged]), *damages)
             else:
-                bounds = law.absorbed_range(*damages)
-            low, high = (float(energies @ cell.files.interface.length[damaged]) / cell.area for energies in bounds)
+                lower, upper = law.absorbed_range(*damages)
+            low, high = (float(bound @ cell.files.interface.length[damaged]) / cell.area for bound in (lower, upper))
             grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
             off = max(low - grown, grown - high, 0.0) / scale
             findings.record("energy", off, f"{after.name}, fracture_energy")
@@ -152,7 +153,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> No
         has_factor = "factor" in point  # else no load in this direction breaks a bond
         imposed = unit if of_strains else np.linalg.solve(stiffness, unit)
         strain = np.array(point["strain"]) if has_factor else imposed
-        shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature * has_factor]), rcond=None)
+        shares, *_ = np.linalg.lstsq(unit_loads, np.array([*strain, temperature if has_factor else 0.0]), rcond=None)
         traction = np.asarray(np.tensordot(shares, unit_tractions, axes=1), float)
         used = np.where(may_break, law.onset(traction), 0.0)
         if not has_factor:

@@ -50,7 +50,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         for name, value in zip(names, values + sign * STEP * direction, strict=True):
             table, key, index = _place(case, name)
             numbers = np.array(table[key], float)
-            numbers[index] = numbers[index[::-1]] = value
+            numbers[index] = numbers[index[::-1]] = value  # matrices are symmetric
             table[key] = numbers.tolist()
         energies.append(_energies(cell, states, case))
     check = _check_load if "load" in document else _check_moduli
@@ -73,7 +73,7 @@ def _parameters(cell: DiscreteCell) -> set[str]:
             numbers = np.array([*value] if isinstance(value, dict) else value)
             ends = [f".{end}" for end in (value if isinstance(value, dict) else range(1, numbers.size + 1))]
             if numbers.ndim > 1:
-                ends = [f".{'Ck'[conducts]}{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+                ends = [f".{'k' if conducts else 'C'}{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
             names |= {f"material.{phase}.{key}{end}" for end in (ends if numbers.ndim else [""])}
     springs = ("conductance",) if conducts else SPRINGS
     for number, section in enumerate(sections, start=1):
@@ -101,7 +101,7 @@ def _check_moduli(findings: Findings, cell: DiscreteCell, states: list[State], s
         law, floor = "constants", 0.0
         thermal = {name: value for name, value in constants.items() if name.startswith("thermal")}
         constants = thermal | _entries("C", C)
-        changes = {f"C{k + 1}{k + 1}": slope[k, k] for k in range(n)}
+        changes = {f"C{i + 1}{i + 1}": slope[i, i] for i in range(n)}
         for name, energy in zip(changes, np.diag(_energies(cell, states, cell.files.case)), strict=True):
             value = data["constant_values"][data["constants"].index(name)]
             findings.compare("constants", value, energy, max(abs(energy), TINY), name)
@@ -133,25 +133,26 @@ def _check_load(findings: Findings, cell: DiscreteCell, states: list[State], slo
     """
     data, point = cell.files.document["sensitivities"], cell.files.document["load"]
     pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
-    rows = dict(zip(data["constants"], zip(data["constant_values"], data["derivatives"], strict=True), strict=True))
-    answers = [[name for name in pair if name in rows] for pair in pairs]
-    is_complete = all(len(names) == 1 for names in answers) and "stored" in rows
+    values = dict(zip(data["constants"], data["constant_values"], strict=True))
+    derivatives = dict(zip(data["constants"], data["derivatives"], strict=True))
+    answers = [[name for name in pair if name in values] for pair in pairs]
+    is_complete = all(len(names) == 1 for names in answers) and "stored" in values
     findings.require("tables", is_complete, "sensitivities, constants of the load")
     if not is_complete:
         return
-    stored_terms = np.array(rows["stored"][1]) * direction
+    stored_terms = np.array(derivatives["stored"]) * direction
     terms, rest = np.zeros_like(direction), stored_terms.copy()
     for (name,), strain, stress, (strain_name, _) in zip(answers, point["strain"], point["stress"], pairs, strict=True):
         value, conjugate, sign = (strain, stress, -1) if name == strain_name else (stress, strain, 1)
         size = max(map(abs, point["strain" if name == strain_name else "stress"]))
-        findings.compare("constants", rows[name][0], value, size, name)
-        change = conjugate / 2 * np.array(rows[name][1]) * direction
+        findings.compare("constants", values[name], value, size, name)
+        change = conjugate / 2 * np.array(derivatives[name]) * direction
         terms, rest = terms + sign * change, rest - change
     if states[0].temperature:
         data.leaves_open("derivatives")
         return
     energy = _energies(cell, states, cell.files.case)[0, 0] / 2
-    findings.compare("constants", rows["stored"][0], energy, max(abs(energy), TINY), "stored")
+    findings.compare("constants", values["stored"], energy, max(abs(energy), TINY), "stored")
     scale = max(float(np.abs(terms).max()), float(np.abs(stored_terms).max()), abs(energy))
     off = [terms.sum() - slope[0, 0] / 2, rest.sum()]
     findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])

@@ -48,7 +48,8 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     findings.compare("Hill", fields.energy, work, max(abs(fields.energy), least), state.name)
     if not cell.files.is_spatial:
         rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
-        S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
+        S33 = np.einsum("ei,ei->e", rules, state.stress)
+        terms = np.einsum("ei,ei->e", np.abs(rules), np.abs(state.stress))
         undetermined = np.isnan(S33) & np.isnan(state.stress_33)  # the constants of the phase leave S33 open
         off = np.where(undetermined, 0.0, state.stress_33 - S33)
         findings.record("stress 33", relative(off, np.where(undetermined, 1.0, terms)), element)
@@ -128,15 +129,15 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     if not len(bonded):
         return
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
-    pressure, (_, least, imposed) = np.maximum(-normal, 0.0), cell.scales_of(state)
-    pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * files.interface.length
+    pressure, scales = np.maximum(-normal, 0.0), cell.scales_of(state)
+    pull, force = max(float(np.abs(state.traction).max()), scales.stress), np.abs(normal) * files.interface.length
 
     def record(law: str, violation: Float, scale: float) -> None:
         findings.record(law, relative(violation, scale), at)
 
     if not bonded.all():
         friction, closed = friction_at(files) * pressure, state.status == Status.CLOSED
-        push = max(float(force.max()), least * float(files.interface.length.max()))
+        push = max(float(force.max()), scales.stress * float(files.interface.length.max()))
         excess = np.where(bonded, 0.0, np.maximum(shear - friction, 0.0))
         record("free faces", excess + np.where(state.status == Status.OPEN, np.abs(normal), 0.0), pull)
         if friction.any():
@@ -144,9 +145,9 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
             record("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull)
             record("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0)
         if files.contact:
-            record("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), imposed)
+            record("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), scales.displacement)
             record("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull)
-            record("complementarity", np.where(bonded, 0.0, force * gap), push * imposed)
+            record("complementarity", np.where(bonded, 0.0, force * gap), push * scales.displacement)
     if rubs.any():
         rubbing, limit = rubbing_force(files, state), friction_at(files, on_damage=True) * pressure
         sticks = np.maximum(np.abs(rubbing) - limit, 0.0)

@@ -181,7 +181,7 @@ def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -
     They solve int sigma grad b = 0 and int r_a (p - lambda tr eps) = 0.  Arguments: dN_a/dx (e, q, 6, 2), weights
     (e, q), elastic strains (e, q, v) without bubbles, lambda and mu (e, 2).
     """
-    (first, shear), places = lame.T, quadrature_points()
+    (lam, mu), places = lame.T, quadrature_points()
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
     bubble = np.einsum("qa,eqad->eqd", places[:, [1, 2, 0]] * places[:, [2, 0, 1]], slopes)  # gradients of the bubble
     square = np.einsum("eq,eqd,eqk->edk", weights, bubble, bubble)
@@ -189,13 +189,13 @@ def inner_fields(gradients: Float, weights: Float, strain: Float, lame: Float) -
     matrix, right = np.zeros((len(weights), 5, 5)), np.zeros((len(weights), 5, 1))
     matrix[:, :2, :2] = square + np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(2)
     # The unknown is pressure / mu, so that both equations have the unit of strains.
-    matrix[:, :2, 2:], matrix[:, 2:, :2] = moment.transpose(0, 2, 1), (first / shear)[:, None, None] * moment
+    matrix[:, :2, 2:], matrix[:, 2:, :2] = moment.transpose(0, 2, 1), (lam / mu)[:, None, None] * moment
     matrix[:, 2:, 2:] = -np.einsum("eq,qm,qn->emn", weights, places, places)
     e11, e22, e12 = (strain[..., k] for k in (0, 1, -1))
     pulled = np.stack([2 * e11 * bubble[..., 0] + e12 * bubble[..., 1],
                        2 * e22 * bubble[..., 1] + e12 * bubble[..., 0]], axis=-1)  # fmt: skip
     right[:, :2, 0] = -np.einsum("eq,eqi->ei", weights, pulled)
     trace = strain[..., NORMAL[strain.shape[2]]].sum(axis=2)
-    right[:, 2:, 0] = -(first / shear)[:, None] * np.einsum("eq,qm,eq->em", weights, places, trace)
+    right[:, 2:, 0] = -(lam / mu)[:, None] * np.einsum("eq,qm,eq->em", weights, places, trace)
     solution = np.linalg.solve(matrix, right)[..., 0]
-    return np.einsum("ei,eqd->eqid", solution[:, :2], bubble), shear[:, None] * (solution[:, 2:] @ places.T)
+    return np.einsum("ei,eqd->eqid", solution[:, :2], bubble), mu[:, None] * (solution[:, 2:] @ places.T)

@@ -243,8 +243,8 @@ def unchecked(document: Section) -> dict[str, list[str]]:
 
     If no law has read any number of a table, the name of the table represents them.  Copies are always in the list.
     """
-    names = (document.unread, document.places)
-    unread, total = (Counter(re.sub(r"\[\d+\]", "[]", place) for place in places) for places in names)
+    groups = (document.unread, document.places)
+    unread, total = (Counter(re.sub(r"\[\d+\]", "[]", place) for place in places) for places in groups)
     read = {re.split(r"[.\[]", name)[0] for name in total if name not in unread}
     names_of: dict[str, list[str]] = {COPIES: [*COPIED]}
     for name, count in unread.items():

@@ -188,15 +188,15 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)
     numbers = [PointNumbers.of(cell, number, load, of_point.get(number)) for number, load in enumerate(loads)]
     scale = max(point.stored for point in numbers) + cell.rounded_energy or 1e-300
-    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's mean, later with the temperature
+    voigt: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)
     thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, cell.expansions)
     square = np.einsum("p,pi,pij,pj->", cell.fractions, cell.expansions, cell.stiffnesses, cell.expansions)
-    C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
+    C = np.block([[voigt, -thermal[:, None]], [-thermal[None], square]])  # with the temperature as last strain
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         off, place = point["work"] - now.stored - point["dissipated"], f"{now.name}, work - stored - dissipated"
         findings.record("energy", abs(off) / scale, place)
-        state, before = (numbers[number - 1] if number else None), points[number - 1]
-        lost, low, high = point["dissipated"] - (before["dissipated"] if number else 0.0), 0.0, 0.0
+        state, before = (numbers[number - 1], points[number - 1]) if number else (None, {"dissipated": 0.0})
+        lost, low, high = point["dissipated"] - before["dissipated"], 0.0, 0.0
         if by_events and state:
             if damaged_at(before):
                 least, largest = potentials(state.load, now)

@@ -187,11 +187,11 @@ class ResultFiles:
                 plane, axial = arrays["stress"], group["axial_stress"][()]
                 arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
             strain, mean = (np.array(attributes[name], float) for name in ("strain", "stress"))
-            name, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
+            title, temperature = f"state {number} ({attributes['label']})", float(attributes.get("temperature", 0.0))
             factor, point = float(attributes["load_factor"]), int(attributes["point"])
             x = self.mesh.points - self.mesh.points.min(axis=0)
             arrays["fluctuation"] = arrays["displacement"] - x @ gradient(strain).T
-            yield State(name, strain, mean, factor, point, temperature=temperature, **arrays)
+            yield State(title, strain, mean, factor, point, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:

@@ -76,8 +76,8 @@ def torn(mesh: Mesh, size: Float, shift: Float | None) -> tuple[TornSides, TornN
     pairs = (np.cumsum(sharers) - sharers)[sharers == 2]
     partner = np.full(len(side_place), -1)
     partner[order[pairs]], partner[order[pairs + 1]] = order[pairs + 1], order[pairs]
-    alone, low = np.asarray(sharers[side_place] == 1), mesh.points.min(axis=0)
-    on_level = [(np.abs(ends - level) < radius).all(axis=1) for level in (low, low + size)]
+    alone, corner = np.asarray(sharers[side_place] == 1), mesh.points.min(axis=0)
+    on_level = [(np.abs(ends - level) < radius).all(axis=1) for level in (corner, corner + size)]
     on_side = alone & np.any(on_level, axis=(0, 2)) & (shift is None)
     sides = TornSides(element, nodes, normal, partner, alone, np.asarray(on_side))
     number, first = np.unique(nodes, return_index=True)

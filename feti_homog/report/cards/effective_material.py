@@ -82,10 +82,8 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """Return the material of a result with stiffness and expansion as computed.
 
     Shears are uncoupled, and the material orthotropic, if their couplings and expansions are within NEGLIGIBLE.
-
-    Raises:
-        CaseError: the result has no linear spatial stiffness, or did not converge.
-        KeyError, TypeError, ValueError: the result is damaged.
+    Raises CaseError if the result has no linear spatial stiffness, or did not converge; KeyError, TypeError or
+    ValueError if it is damaged.
     """
     C = _stiffness(document)[np.ix_(ORDER, ORDER)]
     computed = document.get("thermal_expansion")
@@ -213,11 +211,9 @@ def identifier(name: str) -> str:
 def conductor_card(document: Document, form: str, symmetry: str) -> str:
     """Return the card of a conductivity as computed, or of the nearest "transversely isotropic" conductivity.
 
-    A card has no couplings k_ij: as computed, they must be at most `NEGLIGIBLE` sqrt(k_ii k_jj).
-
-    Raises:
-        CaseError: the result did not converge, has larger couplings, or the format has no conductivity.
-        KeyError, TypeError, ValueError: the result is damaged.
+    A card has no couplings k_ij: as computed, they must be at most `NEGLIGIBLE` sqrt(k_ii k_jj).  Raises CaseError if
+    they are larger, the result did not converge, or the format has no conductivity; KeyError, TypeError or ValueError
+    if the result is damaged.
     """
     require_done(document)
     turn = np.ix_(FIBRE_FIRST, FIBRE_FIRST)
@@ -226,7 +222,8 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
     couplings = float((np.abs(k) / np.sqrt(np.outer(values, values)))[~np.eye(3, dtype=bool)].max())
     text = f"Couplings of up to {couplings:.2g} sqrt(kii kjj) are left out."
     if symmetry == "transversely isotropic":
-        values[1:], text = values[1:].mean(), f"{text} k22 and k33 are the mean across the fibres."
+        values[1:] = values[1:].mean()
+        text += " k22 and k33 are the mean across the fibres."
     elif couplings > NEGLIGIBLE:
         raise CaseError("its conductivity has couplings in its axes; use --transversely-isotropic")
     origin = f"Effective conductivity of {name}, by feti_homog {document['version']}; nothing is converted."

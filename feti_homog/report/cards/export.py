@@ -159,8 +159,8 @@ def csv_table(material: effective_material.EffectiveMaterial) -> str:
         axes = [int(digit) for digit in name if digit.isdigit()]
         where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
         meanings = {"E": f"Young's modulus along {where}", "G": f"shear modulus between {where}"}
-        ratio = f"-eps_{axes[-1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
-        rows.append((name, value, "" if name[0] == "n" else unit, meanings.get(name[0], ratio)))
+        meanings["n"] = f"-eps_{axes[-1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
+        rows.append((name, value, "" if name.startswith("nu") else unit, meanings[name[0]]))
     strains: list[float] = [] if material.expansion is None else material.expansion.tolist()
     for name, component, value in zip(engineering_constants.MATERIAL_EXPANSIONS, COMPONENTS, strains, strict=False):
         rows.append((name, value, "1 / temperature", f"thermal strain {component} per unit of temperature"))

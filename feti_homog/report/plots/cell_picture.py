@@ -54,15 +54,15 @@ def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PL
     present = np.unique(drawn.phase)
     # Legends leave out labels that begin with "_".
     labels = [f" {name}" if name.startswith("_") else name for name in phases]
-    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=labels[k]) for k in present[:IN_LEGEND]]
-    arcs = list[Line2D]()
+    style: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.6}
+    entries: list[Any] = [Patch(facecolor=inks[k], label=labels[k], **style) for k in present[:IN_LEGEND]]
     if len(present) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     state = cell.file.get("state/0")  # before the load breaks bonds
-    if state is not None and (edges := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
-        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[edges]], CUT, 2.4, "round")
-        arcs = [Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded")]
-    plot_helpers.legend_below(picture, [*entries, *arcs], 4)
+    if state is not None and (is_debonded := cell.interface.state(state["status"][:]) != drawn_cell.BONDED).any():
+        plot_helpers.draw_segments(axes, drawn.points[cell.interface.edges[is_debonded]], CUT, 2.4, "round")
+        entries.append(Line2D([], [], color=CUT, linewidth=2.4, label="initially debonded"))
+    plot_helpers.legend_below(picture, entries, 4)
     return picture
 
 
@@ -78,7 +78,8 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
     """
     drawn, ranks = cell.drawn, np.unique(cell.drawn.rank)
     kind, coloured = ("rank", drawn.rank) if len(ranks) > 1 else ("part", drawn.subdomain)
-    is_numbered = len(numbers := np.unique(coloured)) > IN_LEGEND
+    numbers = np.unique(coloured)
+    is_numbered = len(numbers) > IN_LEGEND
     colours = 1.0 - (0.2 if is_numbered else 0.6) * (1.0 - _cyclic_colours(coloured.max() + 1))
     picture, axes = _outlined(cell, colours[coloured], look)
     cuts = decimation.outline_edges(drawn, drawn.subdomain)
@@ -87,7 +88,8 @@ def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers
     text = f"bodies: {drawn.body.max() + 1}, parts within bodies: {drawn.subdomain.max() + 1}, ranks: {len(ranks)}"
     axes.set_title(_title(cell.file.attrs, text))
     entries: list[Any] = [Patch(facecolor=colours[k], label=f"{kind} {k}") for k in numbers if not is_numbered]
-    entries += [Line2D([], [], color=CUT, label="cut within a body")] * (len(cuts) > len(cell.borders))
+    if len(cuts) > len(cell.borders):
+        entries.append(Line2D([], [], color=CUT, label="cut within a body"))
     plot_helpers.legend_below(picture, entries)
     scale = 32 * (picture.get_size_inches() - drawn_cell.MARGINS).min() / np.ptp(drawn.points, axis=0).max()
     outline, middles = cKDTree(drawn.points[np.unique(cuts)]), drawn.points[drawn.triangles].mean(axis=1)
@@ -199,8 +201,8 @@ def deformed(
     shear.  For conduction, the figure shows isotherms and minus the flux.
     """
     drawn, attributes, output = cell.drawn, cell.file.attrs, document.get("case", {}).get("output", {})
-    displacement, load = decimation.drawn_displacement(state, drawn), drawn_cell.LoadLabels.of(document)
-    title, scale = load.label(state.attrs), 0.0
+    displacement, scale = decimation.drawn_displacement(state, drawn), 0.0
+    title = drawn_cell.LoadLabels.of(document).label(state.attrs)
     if not is_axial(state):
         largest = decimation.largest_scale(displacement, drawn)
         size, length = float(np.ptp(drawn.points, axis=0).min()), float(np.linalg.norm(displacement, axis=1).max())
@@ -220,15 +222,14 @@ def deformed(
     if max(values.std() for values in phases.values()) < FLAT * np.abs(stress).max():
         title += "\nmeans: " + ", ".join(f"{name} {values.mean():.4g}" for name, values in phases.items())
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
-    if reported(document).name == "conductivity":
+    conducts = reported(document).name == "conductivity"
+    if conducts:
         title = rf"$\partial T / \partial x_{component[1]} = 1$"
         bar.set_label(f"$-q_{component[1]}$ (k times gradient)")
-        caption = f"$T$ every {draw_levels(axes, state, drawn):g}"
-        line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
-    elif is_axial(state):
-        step = draw_levels(axes, state, drawn)
-        caption = f"$u_3$ every {step:g} {plot_helpers.plain(with_micro(attributes['length_unit']))}".rstrip()
-        line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption)
+    if conducts or is_axial(state):
+        step, length_unit = draw_levels(axes, state, drawn), plot_helpers.plain(with_micro(attributes["length_unit"]))
+        label = f"$T$ every {step:g}" if conducts else f"$u_3$ every {step:g} {length_unit}".rstrip()
+        line = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=label)
     else:
         outline: Array = drawn.points[cell.borders]
         if drawn.body.max() >= 8:  # the cell alone

@@ -66,12 +66,13 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> 
     group = 4**level
     pieces = 4 if curved and level == 0 and 4 * len(table) <= limit else 1
 
-    # Corner i is vertex i of one triangle in the group.
-    of_group = np.arange(3) * ((group - 1) // 3), np.arange(3)
-    quarters = pieces > 1
-    corners = _blocks(
-        table, group, block, lambda rows: rows[:, 0][:, QUARTERS].reshape(-1, 3) if quarters else rows[:, *of_group]
-    )
+    def corners_of(rows: Array) -> Array:
+        if pieces > 1:
+            return np.asarray(rows[:, 0][:, QUARTERS].reshape(-1, 3))
+        # Corner i is vertex i of one triangle in the group.
+        return np.asarray(rows[:, np.arange(3) * ((group - 1) // 3), np.arange(3)])
+
+    corners = _blocks(table, group, block, corners_of)
     nodes, triangles = np.unique(corners, return_inverse=True)
     labels = {
         name: np.repeat(_blocks(file[f"mesh/{name}"], group, block, lambda rows: rows[:, 0]), pieces)

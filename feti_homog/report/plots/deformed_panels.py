@@ -51,13 +51,13 @@ class DeformedCell(drawn_cell.DrawnCell):
         The case may name the component; by default it follows from all states, or on a path from the peak.
         """
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
-        component, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
+        chosen, mark_of = document["case"]["output"].get("stress", "auto"), dict[int, str]()
         if reported(document).is_followed:
             mark_of, peak = landmarks.marks(document), landmarks.peak_of(document)
-            component = peak["stress_name"] if component == "auto" and "stress" in peak else component
-        component = plot_helpers.stress_component(component, states)
+            chosen = peak["stress_name"] if chosen == "auto" and "stress" in peak else chosen
+        component, areas = plot_helpers.stress_component(chosen, states), cell.drawn.node_areas
         stress = np.array([plot_helpers.nodal_stress(state, component, cell.drawn) for state in states])
-        colours, areas = plot_helpers.colour_range(stress, cell.drawn.node_areas), cell.drawn.node_areas
+        colours = plot_helpers.colour_range(stress, areas)
         if mark_of.get(int(states[-1].attrs["point"])) == "end" and len(states) > 1:
             # At the end, after all fibres have debonded, stresses may be many times larger than before.
             before, end = (plot_helpers.colour_range(part, areas) for part in (stress[:-1], stress[-1]))
@@ -90,8 +90,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface.mark(axes, moved, state, magnified=0.8)
-        axes.set_aspect("equal")
-        axes.set(xticks=(), yticks=())
+        axes.set(aspect="equal", xticks=(), yticks=())
         axes.set_axis_off()
         # Letters are about half of the font size wide; a panel is a quarter wider than its axes before the layout.
         letters = int(180.0 * axes.bbox.width / axes.figure.dpi / float(axes.title.get_fontsize()))
@@ -107,7 +106,8 @@ class DeformedCell(drawn_cell.DrawnCell):
         """Draw the colour bar of the shapes beside the axes.  If there are two bars, both have titles."""
         is_common = shapes.get_clim() == (self.colours[0].vmin, self.colours[0].vmax)
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2] if is_common else shapes.cmap.colorbar_extend)
-        bar.ax.set_title("end" if not is_common else "before" if OWN_COLOURS in self.marks.values() else "")
+        before = "before" if OWN_COLOURS in self.marks.values() else ""
+        bar.ax.set_title(before if is_common else "end")
         bar.locator = MaxNLocator(6)
 
     @property
@@ -131,7 +131,8 @@ def draw_state(
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.  Raises FetiHomogError if
     result.h5 cannot be read, or has no such state.
     """
-    field_guard.require_own(path := Path(out) / field_file.NAME, number)
+    path = Path(out) / field_file.NAME
+    field_guard.require_own(path, number)
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)
@@ -190,11 +191,12 @@ def panels(file: Any, document: Document, scale: float, look: plot_helpers.Look 
     if analysis.is_followed:
         numbers = landmarks.landmark_states(document, MAX_PANELS, count)
     else:  # the first unit load, if an angle has several
-        every = range(0, count, count // len(document[analysis.name]) or 1)
+        every = range(0, count, max(1, count // len(document[analysis.name])))
         numbers = [every[k] for k in shown_states(document, MAX_ANGLES, len(every))]
     cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
-    size = np.subtract(*_corners(places)[::-1])
+    low, high = _corners(places)
+    size = high - low
     rows, columns = _grid(len(numbers), size[0] / size[1])
     height = _height(size, (WIDTH - 0.5) / columns) + 0.55  # with room for a colour bar and a title
     figure = look.figure(WIDTH, rows * height + 0.7, "compressed")
@@ -230,8 +232,8 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
     """
     ideal = min(math.sqrt(0.7 * panels * ratio), panels)
     most = 3 if panels <= MAX_PANELS else 4
-    choices = {max(1, math.floor(ideal)), math.ceil(ideal), -(-panels // most)}
-    grids = [(rows, columns) for rows in choices if (columns := -(-panels // rows)) <= most]
+    choices = {max(1, math.floor(ideal)), math.ceil(ideal), math.ceil(panels / most)}
+    grids = [(rows, math.ceil(panels / rows)) for rows in choices if math.ceil(panels / rows) <= most]
     return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 

@@ -135,8 +135,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.margins(0.03)
-    axes.set_xlabel(f"$x_1$ {unit}")
-    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.set(xlabel=f"$x_1$ {unit}", ylabel=f"$x_2$ {unit}")
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
@@ -184,12 +183,11 @@ class LoadLabels:
         strains, stresses = voigt.voigt_names(len(strain))
         loads = [(strains[k], float(strain[k])) for k in path_curves.components_above(path_curves.FAINT, strain[None])]
         if self.leading is not None and len(loads) > 2:
-            stress = float(attributes["stress"][self.leading])
-            loads = [
-                (strains[self.leading], float(strain[self.leading])),
-                (stresses[self.leading], stress if abs(stress) > self.least_stress else 0.0),
-            ]
-        loads += [("temperature", temperature)] * (temperature != 0.0)
+            k, stress = self.leading, float(attributes["stress"][self.leading])
+            visible_stress = stress if abs(stress) > self.least_stress else 0.0
+            loads = [(strains[k], float(strain[k])), (stresses[k], visible_stress)]
+        if temperature != 0.0:
+            loads.append(("temperature", temperature))
         return [_formula(name, value) for name, value in loads] or ["no strain"]
 
     def label(self, attributes: Any, in_line: int = 4) -> str:

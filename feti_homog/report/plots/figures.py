@@ -42,9 +42,8 @@ def plot(
     scale. A case without fields has only curves. A `component` overrides the stress component; for a `state`, by
     number, label or mark, only state_K.png is drawn.  Call on one rank.
 
-    Raises:
-        CaseError: the result is damaged, or has no such state or component.
-        FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
+    Raises CaseError if the result is damaged, or has no such state or component; FetiHomogError if result.h5 cannot be
+    read, or a picture cannot be written.
     """
     atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     stored = {path.name for path in directory.iterdir()} & {result_json.NAME, checkpoints.FOLDER}
@@ -69,10 +68,11 @@ def draw(
 
                 curves = response_curves.drawn(document)
                 pictures += [(name, partial(curve, document, look)) for name, curve in curves.items()]
-            for name, picture in pictures[share]:
-                if isinstance(drawn := picture(), Figure):
-                    drawn = plot_helpers.save(drawn, directory / f"{name}.png", look)
-                paths += [drawn] if drawn is not None else []
+            for name, draw_picture in pictures[share]:
+                picture = draw_picture()
+                if isinstance(picture, Figure):
+                    picture = plot_helpers.save(picture, directory / f"{name}.png", look)
+                paths += [picture] if picture is not None else []
     except OSError as error:
         raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
     return paths
@@ -88,19 +88,20 @@ def of_fields(
     report, cell = reported(document), cache(partial(drawn_cell.DrawnCell.of, file))
     states = {number: file[f"state/{number}"] for number in sorted(file.get("state", ()), key=int)}
     stress = document.get("case", {}).get("output", {}).get("stress", "auto")
-    name = plot_helpers.STRESS_TABLES[stress][0] if stress != "auto" else ""
     conducts = report.name == "conductivity"
-    if name and (conducts or any(name not in state or np.isnan(state[name][:]).any() for state in states.values())):
+    if stress != "auto":
+        table, _ = plot_helpers.STRESS_TABLES[stress]
         names = "S11, S22 or S12, and S33, von_mises or principal where the constants of all phases give S33"
         names = "none; its pictures show the flux along the gradient" if conducts else names
-        raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
+        if conducts or any(table not in state or np.isnan(state[table][:]).any() for state in states.values()):
+            raise CaseError(f"--component {stress}: expected a stress that {directory} has: {names}")
     if chosen is not None:
         marks = {n: mark.split(" and ") for n, mark in landmarks.marks(document).items()} if report.is_followed else {}
         labels = {k: [state.attrs["label"], *marks.get(int(state.attrs["point"]), ())] for k, state in states.items()}
-        number = next((k for k, label in labels.items() if str(chosen) in (k, *label)), None)
+        number = next((k for k, names_of_state in labels.items() if str(chosen) in (k, *names_of_state)), None)
         if number is None:
-            lines = ", ".join(f"{k} ({', '.join(label)})" for k, label in labels.items())
-            raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {lines}")
+            listed = ", ".join(f"{k} ({', '.join(names_of_state)})" for k, names_of_state in labels.items())
+            raise CaseError(f"--state {chosen}: expected the number or label of a state of {directory}: {listed}")
         yield f"state_{number}", lambda: cell_picture.deformed(cell(), states[number], document, look)
         return
     yield "cell", lambda: cell_picture.figure(cell(), look)
@@ -119,10 +120,10 @@ def of_fields(
             continue
         loads = dict(zip(voigt.voigt_names(len(strain))[0], strain, strict=True))
         loads["temperature"] = state.attrs.get("temperature", 0.0)
-        (load, value), *further_loads = [load for load in loads.items() if load[1]] or [("", 0.0)]
+        (load, value), *further_loads = [pair for pair in loads.items() if pair[1]] or [("", 0.0)]
         is_unit = abs(value) == 1.0 and not further_loads
-        load = state.attrs["label"].replace("/", "_") if conducts else load
-        name = f"case_{'minus_' if value < 0 else ''}{load}" if is_unit else f"state_{number}"
+        label = state.attrs["label"].replace("/", "_") if conducts else load
+        name = f"case_{'minus_' if value < 0 else ''}{label}" if is_unit else f"state_{number}"
         of_state = partial(lambda state: cell_picture.deformed(cell(), state, document, look), state)
         yield report.picture or name, of_state
     broken = any((state["status"][:] != drawn_cell.BONDED).any() for state in states.values())

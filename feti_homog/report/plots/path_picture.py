@@ -41,14 +41,15 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     axis, strain = path_curves.abscissa(document)
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
     warms = axis != "temperature" and any(point.get("temperature") for point in points)
-    picture = look.figure(7.2, 7.2 + 1.6 * warms)
+    heights = (2.2, 1, 1) if warms else (2.2, 1)
+    picture = look.figure(7.2, 8.8 if warms else 7.2)
     narrow = picture.get_figwidth() < plot_helpers.NARROW
-    upper, *middle, lower = picture.subplots(2 + warms, 1, sharex=True, height_ratios=(2.2, *[1] * warms, 1))
+    upper, *middle, lower = picture.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     has_stress = _main_curves(upper, document, axis, style)
     upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}" if has_stress else "macroscopic strain")
     lower.set_xlabel(_axis_label(axis))
-    title = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
-    upper.set_title("\n".join(filter(None, (title, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
+    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
+    upper.set_title("\n".join(filter(None, (heading, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
         way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
         axes.plot(*(np.append(0.0, way[name]) for name in (axis, "temperature")), color="0.3", lw=1.2, **style)
@@ -64,16 +65,20 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     curve, ink = np.stack([strain, height], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
     largest = landmarks.name_of(document, peak)
-    largest += ", no peak yet," * (largest == landmarks.LARGEST and peak.get("event") == len(points) - 1)
-    for event in {peak[f"{title}event"]: None for title in MARKS if f"{title}event" in peak}:
+    if largest == landmarks.LARGEST and peak.get("event") == len(points) - 1:
+        largest += ", no peak yet,"
+    for event in dict.fromkeys(peak[f"{title}event"] for title in MARKS if f"{title}event" in peak):
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
-        names = [title.replace("_", " ").strip() or largest for title in titles]
-        bond = "" if narrow else landmarks.bond_of(peak, titles[-1]).replace(" degrees", "°")
-        stress, temperature = peak[f"{titles[-1]}stress"], path_curves.temperature_of(document, event)
-        label = " and ".join(names) + (f" {stress:.4g} {unit}".rstrip() if stress or temperature is None else "")
-        label += "" if temperature is None else rf" at $\Delta{{T}}={temperature:.4g}$"
+        last = titles[-1]
+        stress, temperature = peak[f"{last}stress"], path_curves.temperature_of(document, event)
+        label = " and ".join(title.replace("_", " ").strip() or largest for title in titles)
+        if stress or temperature is None:
+            label += f" {stress:.4g} {unit}".rstrip()
+        if temperature is not None:
+            label += rf" at $\Delta{{T}}={temperature:.4g}$"
+        bond = "" if narrow else landmarks.bond_of(peak, last).replace(" degrees", "°")
         label = f"{label}\n{bond}".rstrip()
-        upper.plot(*curve[event], mark := MARKS[titles[-1]], ms=13 if mark == "*" else 7, zorder=6, **star, label=label)
+        upper.plot(*curve[event], MARKS[last], ms=13 if MARKS[last] == "*" else 7, zorder=6, **star, label=label)
     upper.margins(y=0.12)  # room for numbers
     for axes in (upper, *middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
@@ -86,9 +91,8 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
 
 
 def _axis_label(axis: str) -> str:
-    return (
-        f"{'change of temperature' if axis == 'temperature' else 'macroscopic strain'} ${plot_helpers.SYMBOLS[axis]}$"
-    )
+    quantity = "change of temperature" if axis == "temperature" else "macroscopic strain"
+    return f"{quantity} ${plot_helpers.SYMBOLS[axis]}$"
 
 
 def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, Any]) -> bool:
@@ -102,8 +106,9 @@ def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, 
     later = path_curves.table_of([*points[first - 1 : first], *path_curves.later_corners(document)])
     corners = path_curves.load_controlled(points[:first])
     rising = dict(zip(table, corners.T, strict=True)) if document["case"]["path"]["method"] == "events" else None
-    drawn, strains = list[Array](), voigt.voigt_names(len(points[0]["stress"]))[0]
-    inks = dict(zip((*table,), 2 * [plot_helpers.STRESS_INK[name] for name in [*table][: len(strains)]], strict=False))
+    drawn, (strains, stresses) = list[Array](), voigt.voigt_names(len(points[0]["stress"]))
+    inks = {stress: plot_helpers.STRESS_INK[stress] for stress in stresses}
+    inks |= {strain: inks[stress] for strain, stress in zip(strains, stresses, strict=True)}
     folds = rising is not None and bool((np.diff([point["load_factor"] for point in points[:first]]) < 0.0).any())
     for name in names:
         symbol, ink = plot_helpers.SYMBOLS[name], inks[name]
@@ -202,18 +207,17 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     parts |= {rest: lost - fracture, "heat of friction": heat}
     threshold = path_curves.ZERO * np.abs(stored).max()
     parts = {name: values for name, values in parts.items() if np.abs(values).max() > threshold}
-    place, words = curves["load_factor"] * legs, "leg of the path"
+    place, place_label = curves["load_factor"] * legs, "leg of the path"
     if legs == 1:
-        place, words = curves["axis"], _axis_label(path_curves.abscissa(document)[0])
+        place, place_label = curves["axis"], _axis_label(path_curves.abscissa(document)[0])
     picture = look.figure(7.2, 4.6)
     axes = picture.subplots()
     axes.stackplot(place, *parts.values(), labels=[*parts], colors=[AREAS[name] for name in parts])
     axes.plot(place, work, color="0.15", linewidth=1.2, label="work of the loads")
     for leg in range(1, legs):
         axes.axvline(leg, color="0.6", linewidth=0.6, linestyle=":")
-    axes.set_xlim(place.min(), place.max())
     axes.set_ylim(bottom=min(0.0, float(work.min())))
-    axes.set_xlabel(words)
+    axes.set(xlim=(place.min(), place.max()), xlabel=place_label)
     axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
     text = f"energies, the {path_curves.what_rises(document)} rising" if rises else "energies along the path"
     axes.set_title("\n".join(filter(None, [plot_helpers.title_of(case, text), document.get("unfinished")])))
@@ -232,8 +236,9 @@ def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> di
     """
     path, legs, axis = document["case"]["path"], path_curves.legs(document), path_curves.abscissa(document)[0]
     table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}
-    names, (*pairs, T) = voigt.voigt_names(len(points[0]["stress"]))[0], table.values()
-    S, E = (np.array(pairs[part]).T for part in (slice(len(names)), slice(len(names), None)))
+    strains, stresses = voigt.voigt_names(len(points[0]["stress"]))
+    S, E = (np.array([table[name] for name in names]).T for names in (stresses, strains))
+    T = table["temperature"]
     energy = {n: np.array([0.0, *(point.get(n) or 0.0 for point in points)]) for n in (*ENERGIES, "load_factor")}
     work, stored, springs, lost, _, heat, load = energy.values()
     if path_curves.is_proportional(document):
@@ -245,7 +250,7 @@ def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> di
     is_ray = by_events & (position <= 1.0 + path_curves.SAME_LOAD) & (legs == 1 or not heat.any())
     start = np.where(is_ray, load[:-1] / load[1:], 0.0)
     targets = path_curves.targets(document)
-    legs_by_stress = np.array([not any(map(target.get, (*names, "temperature"))) for target in targets])
+    legs_by_stress = np.array([not any(map(target.get, (*strains, "temperature"))) for target in targets])
     by_stress = broken & legs_by_stress[np.ceil(position - path_curves.SAME_LOAD).clip(1).astype(int) - 1]
     begin = np.where(is_ray, work[1:] - stored[1:] * (1.0 - start**2), work[:-1] + 2.0 * by_stress * np.diff(lost))
     dE, dT, C = np.diff(E, axis=0), np.diff(T), (2.0 * stored - (S * E).sum(axis=1)) / np.where(T == 0.0, np.inf, T)

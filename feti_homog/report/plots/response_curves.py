@@ -25,8 +25,8 @@ FAINTEST = 0.005  # smaller entries have no number
 
 def drawn(document: Document) -> Mapping[str, Curve]:
     """Return the functions that draw pictures from result.json only, by picture name."""
-    curves, name = dict[str, Curve](sensitivities=sensitivities, energy=path_picture.energies), reported(document).name
-    return curves | ({name: CURVES[name]} if name in CURVES else {})
+    curves = {"sensitivities": sensitivities, "energy": path_picture.energies}
+    return curves | {name: curve for name, curve in CURVES.items() if name == reported(document).name}
 
 
 def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
@@ -74,8 +74,10 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
     places, temperature = loads(points), case["envelope"].get("temperature")
     notes = [] if temperature is None else [f"$\\Delta{{T}}={{{temperature:g}}}$ first"]
-    notes += ["which breaks bonds alone"] * (points[0].get("factor") == 0.0)
-    notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
+    if points[0].get("factor") == 0.0:
+        notes.append("which breaks bonds alone")
+    if len(broken) < len(points):
+        notes.append(f"no onset in {len(points) - len(broken)} directions")
     if broken:
         # The closed curve through the loads, open where directions have no onset.
         ends, mode = np.roll(places, -1, axis=0), modes(points)
@@ -92,15 +94,12 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
         bar.set_ticks([0, 30, 60, 90], labels=["0, opens", "30", "60", "90, shears"])
         bar.set_label("mode of the first break (degrees)")
         notes += _limit(axes, places[~np.isnan(places[:, 0])])
-    labels = [
-        f"${plot_helpers.SYMBOLS[name]}$" + (f" {plot_helpers.stress_unit(case)}" if name.startswith("S") else "")
-        for name in plane
-    ]
-    axes.set(xlabel=labels[0], ylabel=labels[1])
+    unit = f" {plot_helpers.stress_unit(case)}" if plane[0].startswith("S") else ""
+    axes.set(xlabel=f"${plot_helpers.SYMBOLS[plane[0]]}${unit}", ylabel=f"${plot_helpers.SYMBOLS[plane[1]]}${unit}")
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
     title = plot_helpers.title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
-    axes.set_title("\n".join([title, *plot_helpers.bond_limits(case), *([", ".join(notes)] if notes else [])]))
+    axes.set_title("\n".join(filter(None, [title, *plot_helpers.bond_limits(case), ", ".join(notes)])))
     plot_helpers.faint_grid(axes)
     return picture
 
@@ -116,10 +115,8 @@ def modes(points: Sequence[Document]) -> Array:
     """Return the modes psi (n,) of breaks in degrees: 0 opens, 90 shears.  They are NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
-    normal, tangential, axial = (
-        np.array([point.get(name, 0.0 if name == "axial" else np.nan) for point in points])
-        for name in ("normal", "tangential", "axial")
-    )
+    normal, tangential = (np.array([point.get(name, np.nan) for point in points]) for name in ("normal", "tangential"))
+    axial = np.array([point.get("axial", 0.0) for point in points])
     return np.asarray(np.degrees(np.arctan2(np.hypot(tangential, axial), normal)))
 
 
@@ -133,8 +130,7 @@ def _limit(axes: Axes, places: Array) -> list[str]:
     low, high = visible.min(axis=0), visible.max(axis=0)
     middle, half = (low + high) / 2, 1.12 * (high - low) / 2
     half = np.maximum(half, 0.05 * half.max() or 1.0)
-    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
-    axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    axes.set(xlim=(middle[0] - half[0], middle[0] + half[0]), ylim=(middle[1] - half[1], middle[1] + half[1]))
     return [f"loads up to {size.max():.4g} are outside"] if far.any() else []
 
 
@@ -145,16 +141,17 @@ def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLA
         return None
     names = [plot_helpers.plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
+    width, height = CELL
     names_width = 0.4 + 0.085 * max(map(len, names))
-    size = names_width + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
-    picture = look.figure(*size)
+    picture = look.figure(names_width + width * values.shape[1] + 1.2, 1.4 + height * len(names))
     axes = picture.subplots()
     highest = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
     image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
     narrow = picture.get_figwidth() < plot_helpers.NARROW
     for (row, column), value in np.ndenumerate(values) if not narrow else ():
-        text = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
-        axes.text(column, row, text, ha="center", va="center", color="white" if abs(value) > 0.6 * highest else "black")
+        number = f"{value:.2f}" if abs(value) >= FAINTEST else ""
+        text, ink = "-" if np.isnan(value) else number, "white" if abs(value) > 0.6 * highest else "black"
+        axes.text(column, row, text, ha="center", va="center", color=ink)
     heads = [column.name if narrow else column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
     axes.set_xticks(range(values.shape[1]), heads, rotation=90 if narrow else 0)
     axes.set_yticks(range(len(names)), names)

@@ -32,20 +32,22 @@ NAMES = {
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
     """Draw tractions, jumps and damage of some fibres in rows: the most damaged, or else the most loaded fibre."""
-    file, labels, names = cell.file, drawn_cell.LoadLabels.of(document), _chosen_states(cell.file, document)
-    fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
-    last_state, broken = file[f"state/{names[-1]}"], status != drawn_cell.BONDED
+    file, names = cell.file, _chosen_states(cell.file, document)
+    fibre, last_state = file["interface/fibre"][:], file[f"state/{names[-1]}"]
+    status = last_state["status"][:]
     damage = last_state["damage"][:] if "damage" in last_state else np.zeros(len(status))
-    quantities = [*NAMES][: 3 if ((damage > 0.0) & (damage < 1.0)).any() else 2]
-    harm = np.maximum(damage, broken)
-    load = last_state["traction"][:, 0]
+    is_partial = ((damage > 0.0) & (damage < 1.0)).any()
+    quantities = ["traction", "jump", "damage"] if is_partial else ["traction", "jump"]
+    harm = np.maximum(damage, status != drawn_cell.BONDED)
     bodies, place = np.unique(fibre, return_inverse=True)
     harmed, largest = np.unique(fibre[harm > 0.0]), np.full(len(bodies), -np.inf)
-    np.maximum.at(largest, place, load)
+    np.maximum.at(largest, place, last_state["traction"][:, 0])
     order = np.lexsort((-largest, -np.bincount(place, harm)))  # by damage, then by the largest normal traction
-    picture = look.figure(1.5 + 3.75 * len(quantities), 2.4 * min(4, max(len(harmed), 1)) + 1.5)
-    stacked, rows = picture.get_figwidth() < plot_helpers.NARROW, int(picture.get_figheight() / 1.5)
-    chosen = np.sort(bodies[order][: 1 if stacked else min(4, max(len(harmed), 1), max(rows, 1))])
+    count = min(4, max(len(harmed), 1))
+    picture = look.figure(1.5 + 3.75 * len(quantities), 2.4 * count + 1.5)
+    stacked = picture.get_figwidth() < plot_helpers.NARROW
+    count = 1 if stacked else min(count, max(int(picture.get_figheight() / 1.5), 1))
+    chosen = np.sort(bodies[order[:count]])
     shape = (len(quantities), 1) if stacked else (len(chosen), len(quantities))
     grid = picture.subplots(*shape, sharey=False if stacked else "col", squeeze=False).reshape(len(chosen), -1)
     stress = plot_helpers.stress_label(file.attrs["stress_unit"])
@@ -70,13 +72,10 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     if np.abs(last_state["jump"][:]).max() < SAME_PLACE**2 * file.attrs["width"]:
         grid[0][1].set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
     shaded = status[np.isin(fibre, chosen)]
-    patches = [
-        Patch(color=drawn_cell.STATE_COLOURS[kind], label=drawn_cell.STATE_NAMES[kind], **SHADE)
-        for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
-        if kind in shaded
-    ]
+    kinds = [kind for kind in (drawn_cell.OPEN, drawn_cell.CLOSED) if kind in shaded]
+    patches = [Patch(color=drawn_cell.STATE_COLOURS[k], label=drawn_cell.STATE_NAMES[k], **SHADE) for k in kinds]
     plot_helpers.legend_below(picture, patches)
-    before, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
+    before, last, labels = file[f"state/{names[0]}"].attrs, last_state.attrs, drawn_cell.LoadLabels.of(document)
     title = f"{last['label']}: {labels.label(last)}"
     title += ", one of the loads" if reported(document).name == "stiffness" else ""
     if len(names) > 1:
@@ -91,8 +90,8 @@ def _limit(column: Sequence[Axes]) -> None:
     """Limit the common ordinate if a few nodes at singular tips exceed all other values; mark the hidden extremes."""
     curves = [np.concatenate([np.asarray(line.get_ydata(), float) for line in axes.lines]) for axes in column]
     values = np.concatenate(curves)
-    low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
-    low, high = 2.0 * low - high, 2.0 * high - low
+    lower, upper = np.percentile(values, (SPIKES, 100.0 - SPIKES))
+    low, high = 2.0 * lower - upper, 2.0 * upper - lower
     if high > low and (values.min() < low or values.max() > high):
         column[0].set_ylim(max(values.min(), low), min(values.max(), high))
         for axes, curve in zip(column, curves, strict=True):
@@ -115,7 +114,8 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
     worthwhile = [name for name in names if name in partly or (status[name] == drawn_cell.CLOSED).any()]
     last = (worthwhile or names)[-1]
     if not reported(document).is_followed:
-        return [(partly or [last])[len(partly) // 2 if reported(document).name == "angle" else 0]]
+        middle = len(partly) // 2 if reported(document).name == "angle" else 0
+        return [partly[middle] if partly else last]
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = landmarks.peak_of(document)
     before, after = of_point.get(peak.get("event", 0), names[0]), of_point.get(peak.get("event_left", -1), last)
@@ -136,8 +136,8 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
         values: Array = state[quantity][:]
         if f"axial_{quantity}" in state and (axial := state[f"axial_{quantity}"][:]).any():
             values = np.column_stack([values, axial])
-        values = values.reshape(len(values), -1)
-        values, at, turn = values[place.nodes], place.values, place.ends[1] - place.ends[0]
+        values = values.reshape(len(values), -1)[place.nodes]
+        at, turn = place.values, place.ends[1] - place.ends[0]
         # The curve closes if the gap between the last and the first node is less than twice the largest other gap.
         if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
             at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])

@@ -27,11 +27,9 @@ THERMAL = {
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
 MESH_ERROR = "Mesh error,"
 PAIRS = 2  # constants per line of text
-# Constants whose sensitivities are shown, in the plane (False) and in space (True); result.json has all.
-SHOWN = {
-    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33"),
-    True: tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse"),
-}
+# Constants whose sensitivities are shown, in the plane and in space; result.json has all.
+SHOWN_IN_PLANE = ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12", "k11", "k22", "k33")
+SHOWN_IN_SPACE = tuple(name for name in engineering_constants.ABOUT_FIBRES if name != "K_transverse")
 MOST = 9  # number of other constants that are shown
 
 
@@ -51,8 +49,8 @@ def stiffnesses(document: Document) -> list[Table]:
 def conductivity(document: Document) -> list[Table]:
     """Return tables of the effective conductivity, its mesh errors, and its bounds and estimates."""
     names, k = ("x1", "x2", "x3"), document["effective_conductivity"]
-    title, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
-    matrices = (title, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
+    computed, errors = f"Effective conductivity, {engineering_constants.CELL_AXES}", _errors(document)
+    matrices = (computed, k, ".8g"), (f"{MESH_ERROR} conductivity", errors.get("effective_conductivity"), ".1e")
     tables = [
         Table(title, [Column("", -6), *(Column(name, 16, form) for name in names)],
               [[name, *row] for name, row in zip(names, np.array(matrix).tolist(), strict=True)])
@@ -77,22 +75,23 @@ def _errors(document: Document) -> Document:
 
 
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return a table of constants and mesh errors, `abreast` per line.
+    """Return a table of constants and, unless `errors` is empty, of mesh errors, `abreast` per line.
 
-    Errors have two digits, and constants as many decimals as their errors; ratios without an error have six decimals.
+    Errors have two digits, and constants as many decimals as their errors.  Without an error, constants have seven
+    digits; ratios in tables with `PAIRS` per line have six decimals.
     """
-    rows = []
+    rows, count = [], 3 if errors else 2  # the third column has the errors
     for name, value in values.items():
-        error, form = errors.get(name), ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
-        error_form = ".1e"
+        form, error_form = ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g", ".1e"
+        error = errors.get(name)
         # Other errors are below the digits printed without them, or their constants have extreme sizes.
         if error is not None and error > 1e-7 * abs(value) and 1e-4 < abs(value) < 1e8:
             form = error_form = f".{max(0, 1 - floor(log10(error)))}f"
         texts = [name, number(value, form), "" if error is None else f"+- {error:{error_form}}"]
-        rows.append(texts[: 3 if errors else 2])
+        rows.append(texts[:count])
     width = max((len(name) for name in values), default=0) + 2
     columns = [Column("", -width, indent=0), Column("computed", 13), Column("mesh error", -13, indent=1)]
-    return Table(title, columns[: 3 if errors else 2], rows, abreast=abreast)
+    return Table(title, columns[:count], rows, abreast=abreast)
 
 
 def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Table:
@@ -100,8 +99,8 @@ def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Tab
     in_plane = len(rows) == len(voigt.STRAINS)
     names, width, digits, limit, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
     largest = max(abs(entry) for row in rows for entry in row)
-    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < limit else short
-    form = fixed or form
+    fits = 10.0 ** (4 - digits) < largest < limit
+    form = fixed or (f".{digits - 1 - floor(log10(largest))}f" if fits else short)
     named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
     return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
 
@@ -138,8 +137,9 @@ def bounds(document: Document) -> Table:
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
     for i, name in enumerate(STIFF):
         lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]
-        inside = max(lower - value, value - upper) <= document.get("check_tolerance", 0.0) * abs(value)
-        rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
+        rows.append([f"{name} Reuss, Voigt", lower, value, upper])
+        if not max(lower - value, value - upper) <= document.get("check_tolerance", 0.0) * abs(value):
+            rows[-1].append("outside")
     # These bounds hold for isotropic cells only, so a value outside is no fault.
     for name, (lower, upper) in (limits["hashin_shtrikman"] or {}).items():
         rows.append([f"{name} Hashin-Shtr.", lower, document["moduli"][name], upper])
@@ -165,8 +165,9 @@ def cell_constants(document: Document) -> list[Table]:
     sources: dict[str, Document] = {THIS_CELL: cell, ITS_ERROR: errors}
     sources |= {name.replace("_", " "): row for name, row in (estimates or {}).items()}
     sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
-    numbers = {t: _known({n: row.get(n) for n in engineering_constants.ABOUT_FIBRES}) for t, row in sources.items()}
-    names = [name for name in engineering_constants.ABOUT_FIBRES if any(name in row for row in numbers.values())]
+    about = engineering_constants.ABOUT_FIBRES
+    numbers = {title: _known({name: row.get(name) for name in about}) for title, row in sources.items()}
+    names = [name for name in about if any(name in row for row in numbers.values())]
     rows = [
         [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]
         for title, row in numbers.items()
@@ -259,7 +260,7 @@ def sensitivities(document: Document) -> list[Table]:
 
 def mesh_errors(document: Document) -> dict[str, float]:
     """Return estimated mesh errors by name: constants, C11, ..., k11, ..., and normal expansions."""
-    numbers: Document = document.get("mesh_error") or {}
+    numbers = _errors(document)
     tensors = {"C": numbers.get("effective_stiffness"), "k": numbers.get("effective_conductivity")}
     strains = dict(zip(voigt.EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
     named = {
@@ -271,6 +272,7 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Select constants for tables: SHOWN or, of loads and secants in space, the first MOST, off-diagonals last."""
-    chosen = sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]
-    return [name for name in SHOWN["E3" in names] if name in names] if {"E1", "k11"} & {*names} else chosen
+    """Select constants for tables: SHOWN_* or, of loads and secants in space, the first MOST, off-diagonals last."""
+    if {"E1", "k11"} & {*names}:
+        return [name for name in (SHOWN_IN_SPACE if "E3" in names else SHOWN_IN_PLANE) if name in names]
+    return sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]

@@ -34,17 +34,14 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     if any(point.get("temperature") for point in points):
         varying[load_sections.TEMPERATURE] = np.array([point["temperature"] for point in points])
     varying |= {strains[k]: strain[:, k] for k in acting if stresses[k] in prescribed}
-    first = dict(list(varying.items())[:5])
-    rest = [name for name in varying if name not in first]
+    names, rest = [*varying][:5], [*varying][5:]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
-    rows = [
-        [k, *(without_noise(column[k]) for column in first.values()), *map(points[k].get, ("load_factor", *STATES))]
-        for k in numbers
-    ]
-    columns = [Column(noun := document["case"]["path"]["method"].removesuffix("s"), len(noun), "d")]
-    columns += [*(Column(name, max(11, len(name) + 1)) for name in first), Column("load", 9, ".6f"), *COUNTS]
-    label = stress_label(document)
+    load = ("load_factor", *STATES)
+    rows = [[k, *(without_noise(varying[name][k]) for name in names), *map(points[k].get, load)] for k in numbers]
+    noun, label = document["case"]["path"]["method"].removesuffix("s"), stress_label(document)
+    columns = [Column(noun, len(noun), "d"), *(Column(name, max(11, len(name) + 1)) for name in names)]
+    columns += [Column("load", 9, ".6f"), *COUNTS]
     totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} {noun}s{some}; {broke} bonds broke", columns, rows, totals)
@@ -58,10 +55,10 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[event]:.0f}"
     end = np.flatnonzero(leg_of == leg_of[event])[-1]
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
-    text = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
-    text = begins.get(largest, text)
-    no_peak = "No stress acts on the path, and there is no peak"
-    text = f"{text}: {_landmark(document, peak, '')}" if "event" in peak else no_peak
+    begins[landmarks.LARGEST] = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
+    text = "No stress acts on the path, and there is no peak"
+    if "event" in peak:
+        text = f"{begins[largest]}: {_landmark(document, peak, '')}"
     within = "in the step to " if noun == "increment" else ""
     for title in ("first_softening_", "first_break_"):
         if f"{title}event" in peak:
@@ -76,10 +73,11 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
         text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST and event != end:
         text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
-    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
-    errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
+    places = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
+    errors = {place: document["path"][k].get("mesh_error") for place, k in places.items() if k is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
-    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
+    if parts:
+        text += f"; mesh error of the energy {', '.join(parts)}"
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     for leg, k, number in path_curves.largest_of_legs(document):
@@ -104,8 +102,8 @@ def _landmark(document: Document, peak: Document, title: str) -> str:
 def _load_at(document: Document, number: int, name: str, strain: float) -> str:
     """Write the strain of a point with its name, if any, or the temperature on a leg that changes only temperature."""
     if (temperature := path_curves.temperature_of(document, number)) is not None:
-        name, strain = load_sections.TEMPERATURE, temperature
-    return f"{name} = {without_noise(strain):.6g}".removeprefix(" = ")
+        return f"{load_sections.TEMPERATURE} = {without_noise(temperature):.6g}"
+    return f"{name} = {without_noise(strain):.6g}" if name else f"{without_noise(strain):.6g}"
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
@@ -117,11 +115,8 @@ def _path_energies(document: Document, label: str) -> list[str]:
     points, last = document["path"], document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
-    lines = [
-        f"Work per area{label}: {last['work']:.6g}",
-        *energies(last, label),
-        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
-    ]
+    lines = [f"Work per area{label}: {last['work']:.6g}", *energies(last, label)]
+    lines.append(f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}")
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
         ends = [points[number] for number in path_curves.ends_of_legs(document)]

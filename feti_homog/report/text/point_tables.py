@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import cos, radians, sin
+from math import ceil, cos, radians, sin
 from textwrap import wrap
 from typing import Any
 
@@ -45,7 +45,7 @@ def angle_table(document: Document, limit: int | None = None) -> Table:
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
-    some = points[:: -(-len(points) // (limit or len(points)))]
+    some = points if limit is None else points[:: ceil(len(points) / limit)]
 
     def row(point: Point) -> list[Any]:
         values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
@@ -76,7 +76,8 @@ def load_table(document: Document) -> Table:
     columns = [Column("", -14, indent=0), *(Column(name[1:]) for name in stresses)]
     below = [*energies(point, label), *debonded(document, point)]
     below.append(", ".join(f"{point[state]} {state}" for state in STATES) + " interface nodes")
-    below += [f"Free motions of fibres: {motions}"] if (motions := point["free_motions"]) else []
+    if point["free_motions"]:
+        below.append(f"Free motions of fibres: {point['free_motions']}")
     return Table(title, columns, [["strain", *strain], [f"stress{label}", *sigma]], more, below)
 
 
@@ -100,8 +101,8 @@ def envelope_table(document: Document, limit: int | None = None) -> Table:
     """Return the table of onset loads and first breaks in at most `limit`, or `ENVELOPE_ROWS`, directions."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
-    title = f"Onset of debonding in the plane {', '.join(axes)}"
-    title += f"{stress_label(document) * axes[0].startswith('S')}: {len(points)} directions"
+    unit = stress_label(document) if axes[0].startswith("S") else ""
+    title = f"Onset of debonding in the plane {', '.join(axes)}{unit}: {len(points)} directions"
     title += "" if temperature is None else f", after a temperature of {temperature:g}"
     broken = [point for point in points if "factor" in point]
     rest = len(points) - len(broken)
@@ -115,15 +116,15 @@ def envelope_table(document: Document, limit: int | None = None) -> Table:
     used = "traction / strength" if "normal" in names else "psi of its traction"
     above.append(f"  first bond: its fibre, its direction there (degrees), {used}")
     columns = [Column("angle", 8), *(Column(axis, 12, ".6g") for axis in axes), *map(ONSET.__getitem__, names)]
-    step = max(1, -(-len(points) // (limit or ENVELOPE_ROWS)))
+    step = max(1, ceil(len(points) / (limit or ENVELOPE_ROWS)))
     while len(points) % step:  # directions are evenly spaced
         step += 1
-    rows = [
-        [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
-        if "factor" in point
-        else [point["angle"], "none", "none", *[""] * len(names)]
-        for point in points[::step]
-    ]
+    rows = []
+    for point in points[::step]:
+        if "factor" in point:
+            rows.append([point["angle"], *components(point), *(without_noise(point[name]) for name in names)])
+        else:
+            rows.append([point["angle"], "none", "none", *[""] * len(names)])
     return Table(title, columns, rows, above)
 
 
@@ -145,7 +146,8 @@ def angle_tip_table(document: Document) -> list[Table]:
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
-        rows = [[angle, *list(tip.values())[1:]] for angle, tips in largest for tip in tips.values()]
+        tips_of_load = [(angle, tip) for angle, tips in largest for tip in tips.values()]
+        rows = [[angle, *(value for name, value in tip.items() if name != "load")] for angle, tip in tips_of_load]
         return [Table(title, [Column("angle", 9), *_rate_columns(largest[0][1])], rows)]
     rows = [[angle, *(tip["G"] for tip in tips.values())] for angle, tips in largest]
     return [Table(f"{title} under each load", [Column("angle", 9), *map(Column, loads)], rows)] if rows else []

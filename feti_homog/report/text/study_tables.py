@@ -18,7 +18,7 @@ def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
     data = [f"{test}{d['name']}{strain}" for test, d, strain in zip(tests, measured, strains, strict=True)]
     heads = [FIRST, tables.Column("estimate"), tables.Column("std")]
-    mark = "?" * any("intervals fail" in fault for fault in document["faults"])
+    mark = "?" if any("intervals fail" in fault for fault in document["faults"]) else ""
     heads += [tables.Column(f"{document['confidence']:.0%} interval{mark}", 14), tables.Column("", 12)]
     heads += [tables.Column("  determined by", -40)]
     rows = list[list[Any]]()
@@ -30,26 +30,25 @@ def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
         rows.append([tables.with_unit(name, stress_unit), *numbers, f"  {bound}{', '.join(best)}"])
     printed = [tables.Table("Unknowns", heads, rows, title_in_head=True)]
     rows = [[name, *map(_dash, row)] for name, row in zip(document["unknowns"], document["correlation"], strict=True)]
-    columns = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
-    printed += [tables.Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
-    columns = [FIRST, *(tables.Column(name) for name in NUMBERS[:3]), tables.Column("in std", 10, ".2f")]
+    if len(rows) > 1:
+        heads = [FIRST, *(tables.Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
+        printed.append(tables.Table("Correlation", heads, rows, title_in_head=True))
+    heads = [FIRST, *map(tables.Column, ("value", "std", "computed")), tables.Column("in std", 10, ".2f")]
     rows = [[label, *(datum[n] for n in NUMBERS)] for label, datum in zip(data, measured, strict=True)]
-    printed.append(tables.Table("Measured", columns, rows, title_in_head=True))
+    printed.append(tables.Table("Measured", heads, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
-    total = "beyond all numbers" if (squares := document["sum_of_squares"]) is None else f"{squares:.4g}"
-    last = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
+    total = "beyond all numbers" if document["sum_of_squares"] is None else f"{document['sum_of_squares']:.4g}"
+    notes = [f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"]
     intervals = ((name, row, row["interval"]) for name, row in document["unknowns"].items() if row["std"] is not None)
     wide = [name for name, row, (low, high) in intervals if not row["lower"] <= low <= high <= row["upper"]]
     if wide:
-        last.append(f"Remark: {', '.join(wide)}: the interval reaches beyond the bounds, which it ignores")
+        notes.append(f"Remark: {', '.join(wide)}: the interval reaches beyond the bounds, which it ignores")
     ends = [f"{name} at its {row['at_bound']}" for name, row in document["unknowns"].items() if row["at_bound"]]
     label, worst = max(zip(data, (abs(d["residual"]) for d in measured), strict=True), key=lambda pair: pair[1])
     if ends and worst > MOST_DEVIATIONS:
-        last.append(
-            f"Remark: the fit ends with {', '.join(ends)} bound, and {label} is {worst:.3g} standard deviations off"
-            f"{f'; {axes}' if axes else ''}"
-        )
-    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), *last])
+        remark = f"the fit ends with {', '.join(ends)} bound, and {label} is {worst:.3g} standard deviations off"
+        notes.append(f"Remark: {remark}; {axes}" if axes else f"Remark: {remark}")
+    return "\n\n".join(["", *("\n".join(table.lines) for table in printed), *notes])
 
 
 def _dash(value: float | None) -> float | str:
@@ -58,22 +57,25 @@ def _dash(value: float | None) -> float | str:
 
 def scatter_text(document: Document) -> str:
     """Return the table of results with scatter and input contributions.  Remarks name noisy slopes."""
-    inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
-    heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
+    inputs, heads = document["parameters"], {"value": "value", "+- inputs": "std_inputs"}
+    if document["cells"] > 1:
+        heads |= {"+- cells": "std_cells", "+- both": "std"}
     heads["+- mesh"] = "mesh_error"
     labels = [number["name"].removeprefix("material.") for number in inputs]
     names = [result["name"] for result in document["results"]]
     listed = constant_tables.shown(names) if "E1" in names else names
-    kinds, sizes, results = [name.rstrip("0123456789") for name in names], dict[str, float](), list[Document]()
+    kinds = [name.rstrip("0123456789") for name in names]
+    sizes = dict.fromkeys(kinds, 0.0)
     for kind, result in zip(kinds, document["results"], strict=True):
-        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
+        sizes[kind] = max(sizes[kind], abs(result["value"]), result["std"])
     # Listed results have more scatter than the solver noise of the largest result of their kind.
+    results = list[Document]()
     for kind, result in zip(kinds, document["results"], strict=True):
         if result["name"] in listed and tables.without_noise(result["std"], sizes[kind]) > 0:
             results.append(result)
     rows = list[list[Any]]()
     for result in results:
-        numbers = ["-" if result[key] is None else result[key] for key in heads.values()]
+        numbers = [_dash(result[key]) for key in heads.values()]
         name = tables.with_unit(result["name"], document.get("stress_unit", ""))
         rows.append([name, *numbers, *(100 * fraction for fraction in result["shares"])])
     columns = [tables.Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(tables.Column, heads)]
@@ -89,6 +91,6 @@ def scatter_text(document: Document) -> str:
     several = [result for result in results if result["derivative_errors"]]
     for k, number in enumerate(inputs):
         noisy = ", ".join(r["name"] for r in several if 2 * r["derivative_errors"][k] > abs(r["derivatives"][k]))
-        start = f"Standard error over the cells above half of the slope by {number['name']}"
-        lines += [f"{start}: {noisy}"] if noisy else []
+        if noisy:
+            lines.append(f"Standard error over the cells above half of the slope by {number['name']}: {noisy}")
     return "\n".join(lines)

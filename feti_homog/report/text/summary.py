@@ -122,12 +122,13 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 
         tables += point_tables.TABLES[name](document, most)
     if name in ("stiffness", "envelope"):
-        is_spatial, has_interface = voigt.plane_state_of(document).is_spatial, document["case"].get("interface")
-        tables += [constant_tables.table(document)] if is_spatial and document.get("constants") else []
+        is_spatial = voigt.plane_state_of(document).is_spatial
+        if is_spatial and document.get("constants"):
+            tables.append(constant_tables.table(document))
         tables += constant_tables.stiffnesses(document)
         if is_spatial:
             tables += [*constant_tables.thermal(document), *constant_tables.cell_constants(document)]
-        elif not has_interface:  # moduli and bounds are of bonded, linear composites
+        elif not document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
             tables += [constant_tables.moduli(document), constant_tables.bounds(document)]
     if (tips := document.get("load", document).get("tips")) and tips["load"]:
         from feti_homog.report.text.point_tables import tip_table  # bonded cells have no tips
@@ -153,11 +154,12 @@ def _joined(blocks: Iterable[Sequence[str]]) -> str:
 
 
 def _cell(document: Document) -> list[str]:
-    cell, case = document["cell"], document["case"]
-    unit = with_micro(case.get("output", {}).get("length_unit", ""))
+    cell, shape = document["cell"], document["case"]["cell"]
+    unit = with_micro(document["case"].get("output", {}).get("length_unit", ""))
     size = f"{cell['width']:.6g} x {cell['height']:.6g} {unit}".rstrip()
-    shape, fractions = case["cell"], cell.get("fractions", {})
-    shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
+    shares = [f"{phase} {share:.6f}" for phase, share in cell.get("fractions", {}).items()]
+    shares += [f"voids {cell['porosity']:.6f}"] if cell.get("porosity") else []
+    meshed = f"fibre fraction {cell['fibre_fraction']:.6f}" + (f" ({', '.join(shares)})" if shares else "")
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
     mesh += [f"order {shape['order']}"] if "order" in shape else []
     if "refine" in shape:
@@ -165,9 +167,7 @@ def _cell(document: Document) -> list[str]:
     elif "accuracy" in shape:  # the program chose the mesh by it
         chosen = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
         mesh.append(f"{chosen} for accuracy = {shape['accuracy']:g}")
-    shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
-    lines = _field("Cell", [str(shape["geometry"]), size])
-    lines += _field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])])
+    lines = _field("Cell", [str(shape["geometry"]), size]) + _field("Meshed", [meshed])
     if (distance := cell.get("match_distance")) is not None:
         phrases = f"distances of neighbours differ by {distance:.4f} mean diameters"
         lines += _field("Match", [Path(shape["match"]).name, phrases])
@@ -181,19 +181,20 @@ def _cell(document: Document) -> list[str]:
 def checks(document: Document) -> Table:
     """Return a table of the largest relative error in every checked law.
 
-    Contact laws apply only to cells with an interface.
+    Contact laws apply only to cells with an interface.  A result without tolerances has no verdicts.
     """
-    limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
-    contact, rows, title = document.get("kkt_tolerance", limit), list[list[Any]](), "Checks"
+    limit = document.get("check_tolerance")
+    contact, rows = document.get("kkt_tolerance", limit), list[list[Any]]()
     for law, error in document["checks"].items():
         of_contact = law.startswith("kkt_")
-        if error is None or (of_contact and not has_interface):
+        if error is None or (of_contact and not document["case"].get("interface")):
             continue
         most = contact if of_contact else limit
-        rows.append([law, error, *([] if most is None else ["pass" if error <= most else "FAIL"])])
+        rows.append([law, error] if most is None else [law, error, "pass" if error <= most else "FAIL"])
+    title = "Checks"
     if limit is not None:
-        of_contact = f"; of contact {contact:.1e}" if contact != limit and any("kkt_" in row[0] for row in rows) else ""
-        title = f"Checks (relative, at most {limit:.1e}{of_contact})"
+        differs = contact != limit and any("kkt_" in law for law, *_ in rows)
+        title += f" (relative, at most {limit:.1e}{f'; of contact {contact:.1e}' if differs else ''})"
     columns = [Column("law", 2 - NAME, indent=0), Column("error", 14, ERROR), Column("", -8, indent=4)]
     return Table(title, columns, rows, abreast=1)
 
@@ -225,8 +226,9 @@ def phase_tables(document: Document) -> list[Table]:
         [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
         for name, (phase, k) in zip(names, pairs, strict=True)
     ]
-    loads = " or temperature, all others 0" if "temperature" in labels else ", all others 0"
-    loads = f", under one unit strain{loads}" if labels[0].split()[-1] in voigt.SPATIAL_STRAINS else ""
+    loads = ""
+    if labels[0].split()[-1] in voigt.SPATIAL_STRAINS:
+        loads = f", under one unit strain{' or temperature' if 'temperature' in labels else ''}, all others 0"
     title = f"Largest stresses of the phases{stress_label(document)}, tension positive{loads}"
     tables = [Table(title, heads, rows, below=_stress_error(document))]
     has_modes, load = any(phase.get("mode") for phase in phases), document["case"].get("load", {}).get("to", {})
@@ -234,23 +236,25 @@ def phase_tables(document: Document) -> list[Table]:
     # Load factors need stresses in proportion to the load.
     has_factors = "path" not in document and not ("temperature" in acting and len(acting) > 1)
     stresses = [name for name in acting if has_factors and acting == [name] and name.startswith("S")]
-    used = list[list[Any]]()
-    for name, (phase, k) in zip(names, pairs, strict=True):
-        if "criterion" in phase:
-            value, place = _entry(phase, "utilisation", k)
-            used.append([name, phase["criterion"], value, place])
-            if has_modes:
-                used[-1].append(phase["mode"][k] if phase.get("mode") and value else UNKNOWN)
-            if has_factors:
-                used[-1].append(1.0 / value if value else UNKNOWN)
-            used[-1] += [load[name] / value if value else UNKNOWN for name in stresses]
     heads, notes = [first, Column("criterion", 20), Column("utilisation"), at], list[str]()
     heads += [Column("mode", 20)] if has_modes else []
     if has_factors:
         heads += [Column("load factor"), *(Column(f"at {name}") for name in stresses)]
         alone = "".join(f", at this {name}," for name in stresses)
         notes.append(f"  load factor: at this multiple of the load{alone} the utilisation is 1")
-    return [*tables, *([Table(f"Utilisation of the strengths{loads}", heads, used, below=notes)] if used else [])]
+    rows = []
+    for name, (phase, k) in zip(names, pairs, strict=True):
+        if "criterion" in phase:
+            value, place = _entry(phase, "utilisation", k)
+            row = [name, phase["criterion"], value, place]
+            if has_modes:
+                row.append(phase["mode"][k] if phase.get("mode") and value else UNKNOWN)
+            if has_factors:
+                row.append(1.0 / value if value else UNKNOWN)
+            rows.append([*row, *(load[stress] / value if value else UNKNOWN for stress in stresses)])
+    if rows:
+        tables.append(Table(f"Utilisation of the strengths{loads}", heads, rows, below=notes))
+    return tables
 
 
 def _stress_error(document: Document) -> list[str]:

@@ -137,8 +137,9 @@ class Table:
         """Return the rows as strings for HTML.  Numbers have the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
 
-        def cell(value: Any, form: str) -> str:  # noise becomes zero, but even small errors stay unchanged
-            return number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
+        def cell(value: Any, form: str) -> str:
+            value = value if form == ERROR else without_noise(value)  # even small errors stay unchanged
+            return number(value, "d" if isinstance(value, int) else form)
 
         return [[cell(value, form) for value, form in zip(row, forms, strict=False)] for row in self.rows]
 
@@ -163,7 +164,7 @@ def number(value: Any, form: str) -> str:
 
 
 def without_noise(value: Any, size: float = 1.0) -> Any:
-    """Replace a number by zero if the number is solver noise relative to `size`."""
+    """Return zero for a float that is solver noise relative to `size`, else the value unchanged."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
 
 
