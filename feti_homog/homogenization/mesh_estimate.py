@@ -126,7 +126,7 @@ def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
     """Return the ratios of element and arc errors to such errors on a mesh `fewer` halvings coarser.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
-        return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
+        return SAMPLED[cell.comm.allreduce(any(s.is_mixed for s in cell.subdomains), MPI.LOR)]
     if (fewer or order == 2) and locks(cell.parts, cell.comm):
         return LOCKED[order]
     return NESTED[order][fewer - 1] if fewer else (1.0, 1.0)

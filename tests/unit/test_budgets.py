@@ -19,24 +19,24 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before.
 LINES = {
     ".": 470 + 18 + 0,
-    "analysis": 3000 + 123 + 75,
+    "analysis": 3000 + 139 + 75,
     "case": 2880 + 34 + 120,
     "commands": 560 + 10 + 31,
     "fem": 1150 + 3 - 12,
     "feti": 6300 + 8 + 60,
-    "homogenization": 3230 + 57 + 30,
+    "homogenization": 3230 + 57 + 29,
     "interface": 4000 + 20 - 23,
     "materials": 1430 + 52 + 122,
     "mesh": 5500 + 45 + 278,
     "microstructure": 2140 + 1 + 80,
-    "report": 3420 + 209 + 109,
+    "report": 3420 + 216 + 109,
     "results": 2430 + 208 + 35,
     "schema": 430 + 7 + 5,
     "studies": 2950 + 127 + 2,
     "system": 1770 + 26 + 0,
-    "verify": 3100 + 150 + 75,
+    "verify": 3100 + 157 + 75,
 }
-FILES, TOTAL = 310, 45000 + 713 + 1132
+FILES, TOTAL = 310, 45000 + 742 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
