@@ -43,6 +43,22 @@ def turning_points(values: Float, threshold: float) -> list[int]:
     return [*entries, high if rises else low] if entries else []
 
 
+def deepest_fall(size: Float, share: float | None, broken: Float) -> tuple[int, int | None]:
+    """Return the numbers of the top and the valley of the deepest fall below all values (n,) before it.
+
+    A fall counts if `broken` (n,) increases in it, and if it takes `share` of its top, or begins at the largest value.
+    Without such a fall by more than `LEAST_DROP` of the largest value, returns (n, None).
+    """
+    top = np.maximum.accumulate(np.where(size >= np.maximum.accumulate(size), np.arange(len(size)), 0))
+    fall = np.where(broken > broken[top], size[top] - size, 0.0)
+    counts = size[top] == size.max()
+    if share is not None:
+        counts |= fall >= share * size[top]
+    valley = int(np.where(counts, fall, 0.0).argmax())
+    is_fall = counts[valley] and fall[valley] > LEAST_DROP * size.max()
+    return (int(top[valley]), valley) if is_fall else (len(size), None)
+
+
 def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path; there is no peak if no stress acts.
 
@@ -52,7 +68,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     unfinished path, or after bonds broke without stress.  The entry `so_far` marks a path that is unfinished, or
     stopped early without a fall.
 
-    On a path of events with one leg the load only rises: where bonds break, the cell drops to the next stable branch.
+    On the first leg of a path of events the load only rises: where bonds break, the cell drops to the next stable
+    branch.
     """
     leg, breaking = path_curves.legs_of(document), path_curves.damaging_leg(document)
     points = document["path"] if breaking is None else document["path"][: np.count_nonzero(leg <= breaking)]
@@ -66,7 +83,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     stress = stresses[:, component] + 0.0
     broke = np.array([point["broke"] for point in points])
     number, curve = np.arange(len(stress)), stress  # values of the leading stress, each with its point
-    if path_curves.is_proportional(document):  # two corners of each branch; of the first, only its end
+    by_events = document["case"]["path"]["method"] == "events"
+    if by_events and len(points) <= path_curves.first_leg(document):  # two corners of each branch, one of the first
         number = np.repeat(path_curves.rising_points(points), 2)[1:]
         curve = path_curves.load_controlled(points)[1:, component]
         curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)
@@ -74,11 +92,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[start + np.abs(stress[start:stop]).argmax()]), 0.0, None)
         size[:start] = 0.0
-    turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
-    breaks = [(a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
-    threshold = np.inf if "unfinished" in document or broke[:start].any() else LEAST_FALL
-    falls = [(size[a] - size[b], a, b) for a, b in breaks if a == size.argmax() or 1 - size[b] / size[a] >= threshold]
-    _, top, valley = max(falls, default=(0.0, len(size), None))
+    share = None if "unfinished" in document or broke[:start].any() else LEAST_FALL
+    top, valley = deepest_fall(size, share, np.append(0, np.cumsum(broke))[number])
     event = int(number[size[: top + 1].argmax()])
     strains, names = voigt.voigt_names(len(points[0]["stress"]))
     entries: dict[str, Any] = {"strain_name": strains[component], "stress_name": names[component]}

@@ -29,14 +29,14 @@ LINES = {
     "materials": 1430 + 52 + 122,
     "mesh": 5500 + 45 + 278,
     "microstructure": 2140 + 1 + 80,
-    "report": 3420 + 216 + 109,
-    "results": 2430 + 208 + 35,
+    "report": 3420 + 217 + 109,
+    "results": 2430 + 223 + 35,
     "schema": 430 + 7 + 5,
     "studies": 2950 + 127 + 2,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 157 + 75,
 }
-FILES, TOTAL = 310, 45000 + 742 + 1132
+FILES, TOTAL = 310, 45000 + 758 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

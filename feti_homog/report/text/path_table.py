@@ -66,7 +66,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
-        rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
+        is_rising = noun == "event" and leg_of[peak["event_left"]] == 1
+        rises = f" as the {path_curves.what_rises(document)} rises" if is_rising else ""
         text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
     later = max(range(event, len(stresses)), key=lambda number: abs(stresses[number]))
     if later > event and abs(stresses[later]) > abs(peak["stress"]):

@@ -34,19 +34,19 @@ def document(method: str, waypoints: int, points: list[dict[str, Any]]) -> dict[
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_peak_is_the_largest_stress_with_the_first_break_and_what_is_left(sign: float) -> None:
-    """Snap-back: at the load of the peak the next branch that holds is that of the last point."""
+    """Snap-back: under a rising strain the stress falls to the branch of point 4, then of point 5."""
     points = [point(0.2, 9.0), point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
     for number, each in enumerate(points):
         each |= {"dissipated": 0.1 * number, "broke": int(number not in (0, 5))}
         each |= {name: [sign * value for value in each[name]] for name in ("strain", "stress")}
     path = document("events", 1, points)
     expected = {"stress": 0.5 * sign, "strain": 0.05 * sign, "event": 1, "first_break_stress": 0.5 * sign}
-    expected |= {"first_break_event": 1, "stress_left": 0.2 * sign, "event_left": 4, "dissipated": 0.1}
+    expected |= {"first_break_event": 1, "stress_left": 0.16 * sign, "event_left": 5, "dissipated": 0.1}
     expected |= {"first_break_strain": 0.05 * sign}
     assert peak_of(path) == {"strain_name": "E11", "stress_name": "S11"} | {
         name: pytest.approx(value) for name, value in expected.items()
     }
-    assert marks(path) == {1: "first break and peak", 4: "after the peak", 5: "end"}
+    assert marks(path) == {1: "first break and peak", 5: "after the peak and end"}
     assert {1, 4, 5} <= set(chosen(path, 5))
 
 
@@ -56,6 +56,24 @@ def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
     points = [point(n / 6, 60 * s / n, b) for n, (s, b) in enumerate(zip(stresses, broke, strict=True), 1)]
     found = peak_of(document("increments", 1, points))
     assert (found["event"], found["event_left"], found["stress"]) == (0, 3, pytest.approx(2.0))
+
+
+def test_the_deepest_fall_is_below_the_largest_stress_before_it() -> None:
+    """Saw teeth within the fall, of which none is as deep as the last fall."""
+    teeth = [10.0, 27.0, 23.0, 25.0, 20.7, 31.0, 39.5, 35.1, 38.8]
+    points = [point(n / 9, 90 * s / n) for n, s in enumerate(teeth, 1)]
+    found = peak_of(document("increments", 1, points))
+    assert (found["event"], found["event_left"], found["stress_left"]) == (1, 4, pytest.approx(20.7))
+
+
+def test_an_unloading_leg_changes_no_peak() -> None:
+    """Under events, also with a snap-back below the valley of the rising load."""
+    loads = [(0.2, 9.0), (0.5, 10.0), (0.1, 8.0), (0.6, 6.0), (1.0, 5.5)]
+    points = [point(load, stiffness) for load, stiffness in loads]
+    one = peak_of(document("events", 1, points))
+    halves = [each | {"load_factor": each["load_factor"] / 2} for each in points]
+    two = document("events", 2, [*halves, point(1.0, 0.0, 0)])
+    assert peak_of(two) == one and one["event_left"] == 3
 
 
 def test_rising_strain_is_that_of_the_first_leg() -> None:
@@ -134,7 +152,8 @@ def test_the_strength_of_the_first_leg_is_the_peak_although_later_legs_strain_mo
         entry |= {"load_factor": load, "broke": broke, "strain": [entry["strain"][0], 60.0 * load, gamma]}
     peak = peak_of(path)
     assert (peak["stress_name"], peak["stress"], peak["event"], peak["first_break_event"]) == ("S11", 5.0, 1, 1)
-    assert peak["stress_left"] == 3.0 and peak["event_left"] == 2  # the second leg unloads, and is no fall
+    # On the ray of point 2 at the load of the break; the second leg unloads, and is no fall.
+    assert peak["stress_left"] == pytest.approx(3.0 * 0.3 / (1 / 3)) and peak["event_left"] == 2
     assert list(largest_of_legs(path)) == [(2, 0, 3), (3, 2, 4)]
     for entry in path["path"][:3]:
         entry["broke"] = 0

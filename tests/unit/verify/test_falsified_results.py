@@ -153,7 +153,9 @@ FALSE = {
     "a stress of a point without fields": ("thinned", document("path", 1, "stress", 0, factor=1.01), {"energy"}),
     "a strain of a point without fields": ("thinned", document("path", 1, "strain", 0), {"load"}),
     "a count of a point without fields": ("thinned", document("path", 1, "bonded", factor=2), {"breaks", "tables"}),
-    "the point of a state": ("thinned", attribute("point", factor=2, state=1), {"load", "tables", "breaks", "energy"}),
+    "the point of a state": (
+        "thinned", attribute("point", factor=2, state=1), {"load", "tables", "breaks", "energy", "strength"},
+    ),
     "the points of states": ("thinned", document("states", 1, factor=2), {"tables"}),
     "more states than were asked for": ("thinned", document("case", "output", "states", to=6), {"load"}),
     "a strength too low": ("path", document("case", "interface", "normal_strength", factor=0.99), {"strength"}),
