@@ -163,7 +163,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             faults.add(number, fault)
         else:
             rows[number] = {c.name: c.read(cells[c.place], delimiter) for c in read if cells[c.place]}
-    remarks = (f"[cell] {name}: not read: {', '.join(map(wording.toml_value, unread))}",) if unread else ()
+    remarks = _remarks(name, words, unread)
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
 
@@ -218,6 +218,17 @@ def _check_names(
     for name in ("x", "y", *sizes):
         if name not in names:
             faults.add(row, f"column {name}: missing{ignored}")
+
+
+def _remarks(name: str, words: Sequence[str], unread: Sequence[str]) -> tuple[str, ...]:
+    """Return remarks on unread columns, and on a table where y points down."""
+    remarks = list[str]()
+    if unread:
+        remarks.append(f"[cell] {name}: not read: {', '.join(map(wording.toml_value, unread))}")
+    if table_columns.points_down(words):
+        signs = "terms that couple a normal and a shear component, such as C13, change sign"
+        remarks.append(f"[cell] {name}: the cell mirrors the picture, in which y points down; {signs}")
+    return tuple(remarks)
 
 
 def _table(

@@ -90,8 +90,11 @@ UNIT = re.compile(rf"([\[(/_\s]({UNITS})(\^?[2²])?[\])]?|\[[^][]*\]|\([^()]*\)|
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
+SCIKITS_AXES = ("axis_major_length", "major_axis_length")
 AXES_OF_PICTURES = {"major", MATLABS_AXIS}
 """Names of major axes in tables where y points down, but angles are counter-clockwise in the picture."""
+POINTING_DOWN = AXES_OF_PICTURES | {*SCIKITS_AXES, "row", "centroid-0", "centroid_2"}
+"""Names of columns in tables where y points down."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
@@ -101,8 +104,8 @@ EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diam
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
     (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1", "col", "column"), "x", float),
     (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0", "row"), "y", float),
-    (("major", MATLABS_AXIS), "a", lambda d: d / 2),
-    (("minor", "minoraxislength"), "b", lambda d: d / 2),
+    (("major", MATLABS_AXIS, *SCIKITS_AXES), "a", lambda d: d / 2),
+    (("minor", "minoraxislength", "axis_minor_length", "minor_axis_length"), "b", lambda d: d / 2),
     (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", float),
     (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", lambda d: d / 2),
     (("area",), "radius", lambda area: math.copysign(math.sqrt(abs(area) / math.pi), area)),
@@ -136,11 +139,15 @@ def _bare(word: str) -> str:
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
     """Recognize `known` columns, also by names in OTHERS, regardless of case.  Returns columns and unread names."""
     bare = list(map(_bare, words))
-    if MATLABS_AXIS in bare:
-        # MATLAB's orientation is an angle; other programs' orientations are in radians, or from another axis.
+    values: dict[str, Callable[[float], float]] = {}
+    if not AXES_OF_PICTURES.isdisjoint(bare):
+        # Where y points down, angles are still counter-clockwise in the picture.
+        values["angle"] = lambda value: -value
+    elif "orientation" in bare and not set(SCIKITS_AXES).isdisjoint(bare):
+        values["angle"] = lambda value: 90.0 - math.degrees(value)  # radians from the direction of the rows
+    if values and "major" not in bare:
+        # The orientations of other programs may be from another axis.
         bare = ["angle" if name == "orientation" else name for name in bare]
-    # Where y points down, angles are still counter-clockwise in the picture.
-    values: dict[str, Callable[[float], float]] = {"angle": lambda value: -value} if AXES_OF_PICTURES & {*bare} else {}
     columns = [SourceColumn(place, name, values.get(name, float)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
@@ -150,6 +157,11 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
                 columns.append(SourceColumn(bare.index(other), name, value))
     read = {column.place for column in columns}
     return columns, [word for place, word in enumerate(words) if place not in read]
+
+
+def points_down(words: Sequence[str]) -> bool:
+    """Return whether y points down in a table with these names of columns, as in pictures."""
+    return not POINTING_DOWN.isdisjoint(map(_bare, words))
 
 
 def are_units(words: Sequence[str]) -> bool:

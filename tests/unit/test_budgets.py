@@ -27,8 +27,8 @@ LINES = {
     "homogenization": 3230 + 57 + 29,
     "interface": 4000 + 20 - 23,
     "materials": 1430 + 52 + 122,
-    "mesh": 5500 + 45 + 278,
-    "microstructure": 2140 + 1 + 80,
+    "mesh": 5500 + 46 + 278,
+    "microstructure": 2140 + 24 + 80,
     "report": 3420 + 217 + 109,
     "results": 2430 + 223 + 35,
     "schema": 430 + 7 + 5,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 157 + 75,
 }
-FILES, TOTAL = 310, 45000 + 758 + 1132
+FILES, TOTAL = 310, 45000 + 782 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -19,6 +19,7 @@ from feti_homog.system.runtime import input_files
 SIZES: dict[str, tuple[int, ...]] = {
     r"(T2D|T3D|B2|B3|DC1D)\w*": (2, 3),
     **{rf"(CPE|CPS|CPEG|DC2D|M3D|S|R3D){size}[A-Z]*5?": (size,) for size in (4, 8, 9)},
+    "CAX4P": (4,),  # the name that meshio gives quadrilaterals
     r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)3[A-Z]*": (3,),
     r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)65?[A-Z]*": (6,),
 }

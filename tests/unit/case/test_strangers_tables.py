@@ -33,9 +33,9 @@ TABLES = {
     "own": "x,y,radius,phase\n2,2,1,fibre\n5,4,1.2,\n",
 }
 WHOLLY_READ = (
-    "own", "NumPy", "MATLAB", "units after a stroke", "Excel for others", "units below", "MATLAB's regionprops",
-    "rows and columns", "blanks in names",
+    "own", "NumPy", "MATLAB", "units after a stroke", "Excel for others", "units below", "blanks in names",
 )  # fmt: skip
+MIRRORED = ("ImageJ", "scikit-image", "MATLAB's regionprops", "rows and columns")
 
 
 def case(path, text, **cell):
@@ -61,6 +61,7 @@ def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
     is_expected(read.cell.table)
     assert len(arrange(read.cell).radii) == 2
     assert bool(read.remarks()) == (writer not in WHOLLY_READ)
+    assert any("mirrors the picture" in remark for remark in read.remarks()) == (writer in MIRRORED)
 
 
 @pytest.mark.parametrize("name", ["t.txt", "t.dat", "t.csv"])
@@ -100,6 +101,23 @@ def test_angles_of_imagej_are_those_of_pictures_whose_y_points_down(tmp_path, na
     (tmp_path / "t.csv").write_text(f"{names}\n2,2,2,1,30\n")
     columns = read_table(tmp_path / "t.csv").columns
     assert [columns[name][0] for name in ("a", "b", "angle")] == [1.0, 0.5, -30.0]
+
+
+@pytest.mark.parametrize("angle", [20.0, -65.0])
+def test_ellipses_of_scikit_image_are_those_that_it_saw(tmp_path, angle):
+    """An ellipse with its axis at this angle from the columns to the rows, measured by `regionprops_table`."""
+    measure = pytest.importorskip("skimage.measure")
+    row, column = np.mgrid[:200, :200] - 100.0
+    along = column * np.cos(np.radians(angle)) + row * np.sin(np.radians(angle))
+    across = row * np.cos(np.radians(angle)) - column * np.sin(np.radians(angle))
+    picture = ((along / 60) ** 2 + (across / 25) ** 2 <= 1.0).astype(int)
+    names = ("centroid", "axis_major_length", "axis_minor_length", "orientation")
+    table = measure.regionprops_table(picture, properties=names)
+    rows = zip(*table.values(), strict=True)
+    (tmp_path / "t.csv").write_text("\n".join([",".join(table), *(",".join(map(str, row)) for row in rows)]))
+    columns = read_table(tmp_path / "t.csv").columns
+    assert [columns[name][0] for name in ("a", "b")] == pytest.approx([60.0, 25.0], rel=0.01)
+    assert (columns["angle"][0] - angle + 90.0) % 180.0 - 90.0 == pytest.approx(0.0, abs=0.5)
 
 
 def test_what_is_not_read_is_remarked(tmp_path):

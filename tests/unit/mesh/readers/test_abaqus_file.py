@@ -1,5 +1,6 @@
 """Input files of Abaqus: what they may have, and their faults."""
 
+import meshio
 import numpy as np
 import pytest
 from support.abaqus import write_inp
@@ -31,6 +32,17 @@ def test_sets_of_element_lines_and_of_sections_are_phases_too(tmp_path):
     sections = [f"*SOLID SECTION, ELSET={name}, MATERIAL=steel\n1.," for name in ("fibre", "matrix")]
     path.write_text(text.replace("*END PART\n", "\n".join([*sets, *sections, "*END PART", ""])))
     assert np.array_equal(read(path).phase, expected.phase)
+
+
+def test_quadrilaterals_written_by_meshio_are_read(tmp_path):
+    """Under the name of an axisymmetric element, with sets of numbers."""
+    points = [[float(i), float(j)] for j in range(3) for i in range(3)]
+    quads = np.array([[k, k + 1, k + 4, k + 3] for k in (0, 1, 3, 4)])
+    sets = {"matrix": [np.array([0, 2])], "fibre": [np.array([1, 3])]}
+    meshio.write(tmp_path / "m.inp", meshio.Mesh(points, [("quad", quads)], cell_sets=sets))
+    assert "CAX4P" in (tmp_path / "m.inp").read_text()
+    mesh = read(tmp_path / "m.inp")
+    assert len(mesh.triangles) == 8 and len(np.unique(mesh.phase)) == 2
 
 
 def test_lines_are_debonded_or_of_a_phase_by_their_set(tmp_path):
