@@ -26,7 +26,7 @@ INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
 class StuckError(NotCarriedError):
-    """A state has no continuation: no face statuses are admissible with det M >= 0, or they change without end."""
+    """A state has no continuation: no admissible statuses of the faces resist, or the statuses change without end."""
 
 
 class CoulombFaces(FaceSystem):
