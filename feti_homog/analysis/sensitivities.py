@@ -111,9 +111,9 @@ def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, fl
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
 ) -> list[list[averaging.Response]]:
-    """Return the responses to unit loads with faces fixed as in the state `name`.  Collective.
+    """Return lists of responses to unit loads, for `problems`, with faces fixed as in the state `name`.  Collective.
 
-    `states` are the responses of this state.  The result is a list of responses for each number in `problems`.
+    `states` are its responses, `problems` indices of `context.loads.problems`.  Checks without contact are recorded.
     """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for number in problems:

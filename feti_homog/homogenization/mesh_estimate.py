@@ -123,7 +123,7 @@ def energy_errors(
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return the ratios of element and arc errors to such errors on a mesh `fewer` halvings coarser.  Collective."""
+    """Return the ratios of element and arc errors to the estimates on a mesh `fewer` halvings coarser.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[cell.comm.allreduce(any(s.is_mixed for s in cell.subdomains), MPI.LOR)]

@@ -189,7 +189,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows without an earlier image (all rows if `is_cut`), and the faults of images."""
+    """Return the mask (N,) of rows without an earlier image (all rows if `is_cut`), and faults of images and places."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])

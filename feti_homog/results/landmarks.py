@@ -62,11 +62,11 @@ def deepest_fall(size: Float, share: float | None, broken: Float) -> tuple[int, 
 def peak_of(document: path_curves.Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` for a non-empty path; there is no peak if no stress acts.
 
-    The peak is the largest stress up to the deepest fall in which bonds break, or on all leading points from the leg on
-    where damage begins under stress: after all fibres debond, the matrix alone may carry a larger stress than the
-    composite did.  Falls by less than `LEAST_FALL` count only after the largest stress, and so do all falls of an
-    unfinished path, or after bonds broke without stress.  The entry `so_far` marks a path that is unfinished, or
-    stopped early without a fall.
+    The peak is the largest stress from the leg with the first damage under stress to the deepest fall in which bonds
+    break or, without such a fall, to the end of the first leg with breaks: after all fibres debond, the matrix alone
+    may carry more.  If a fall is less than `LEAST_FALL`, the path unfinished, or bonds broke earlier without stress,
+    only a fall from the largest stress counts.  The entry `so_far` marks a path that is unfinished, or stopped early
+    without a fall.
 
     On the first leg of a path of events the load only rises: where bonds break, the cell drops to the next stable
     branch.

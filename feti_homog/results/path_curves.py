@@ -72,7 +72,7 @@ def leading_component(document: Document) -> int:
     """Return the index of the component with the largest strain on the leg where damage begins under stress.
 
     Without such a leg, the search includes all points.  It compares the components that the waypoints change there; if
-    only the temperature changes, it compares the stresses of all components, or without stress their strains.
+    only the temperature changes, it compares the stresses of all components, or the strains if no stress acts.
     """
     leg, damaging = legs_of(document), damaging_leg(document, ("broke", "softened"))
     points = np.ones(len(leg), bool) if damaging is None else leg == damaging

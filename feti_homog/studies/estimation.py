@@ -115,8 +115,8 @@ def estimate(
 ) -> ParameterEstimates:
     """Estimate unknowns within bounds from measured data.
 
-    The search takes dogleg steps in the box of the bounds.  If the data do not determine all directions, a trust-region
-    method searches instead: its steps have no component along an undetermined direction.
+    The search takes dogleg steps in the box of the bounds.  If the data do not determine all directions at the start, a
+    trust-region method searches instead: its steps have no component along an undetermined direction.
 
     Args:
         model: computes the values (m,) at unknowns (n,).
@@ -145,7 +145,7 @@ def estimate(
 
 
 def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:
-    """Call a sum of squares on the way of a simplex (Nelder and Mead) down from a start, both (n,), within bounds."""
+    """Call `squares` at the points (n,) of a simplex (Nelder and Mead) that descends from `start` within bounds."""
     size = _sizes(start)
     box = np.transpose(bounds) / size[:, None]
     options = {"maxfev": MOST_EVALUATIONS, "xatol": LEAST_CHANCE, "fatol": 1.0}
@@ -181,9 +181,9 @@ def _sizes(x: Float) -> Float:
 def fit_document(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, steps: str = ""
 ) -> dict[str, Any]:
-    """Return the content of fit.json without its name.  Infinities and NaN become None.
+    """Return the content of fit.json without the entry `name`.  Infinities and NaN become None.
 
-    `steps` is the key of a softening law that sets its teeth, with its value; empty without one.
+    `steps` quotes the key that sets the teeth of a softening law, such as "teeth = 8"; empty without one.
     """
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     misfits = estimates.misfits

@@ -39,7 +39,7 @@ class Fit(Study):
 
     Attributes:
         unknowns: starts and bounds of the unknowns, by dotted key.
-        paths: keys of the unknowns.
+        paths: keys of the unknowns, in the same order, each as a path in the case document.
         tests: changes that each test makes to the case document.
         data: measured values, ordered by test.
     """
@@ -170,10 +170,10 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Return the estimates from the start; after a poor fit or CaseError, also from other points.  On rank 0.
+        """Search from the start and, after a poor fit or CaseError, from better points.  On rank 0.
 
-        Further searches begin at the best of `STARTS` points and, where derivatives mislead at jumps of a curve, at the
-        end of a simplex from the start.
+        Each further search begins at the best point computed so far: after `STARTS` - 1 further points and, if the fit
+        is still poor, after a simplex from the start, for derivatives mislead at jumps of a curve.
         """
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
@@ -209,7 +209,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """Return the data (m,) at the unknowns x (n,); compute and store them at the first call for x.  On rank 0."""
+        """Return the computed values (m,) at the unknowns x (n,), stored at the first call for x.  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
@@ -224,8 +224,8 @@ class Evaluations:
     def jacobian(self, x: Float) -> Float:
         """Return the derivatives (m, n) of the computed values by x (n,), exact or by differences.  On rank 0.
 
-        With a softening law of few teeth, a step may change no datum: that side of the difference is then computed
-        again with twice the step, up to a tenth of the width of the bounds.
+        With a softening law of few teeth, a step may change no value: that side of the difference is then computed
+        again with the step doubled until a value changes, at most to a tenth of the width of the bounds.
         """
         key, centre = _rounded(x), self.values(x)
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))

@@ -51,7 +51,7 @@ def draw_over_fractions(directory: Path, table: SweepTable) -> list[Path]:
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """Return the names of the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak."""
+    """Name the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak; () if none."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)
@@ -62,7 +62,7 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
 
 
 def figure_over_fractions(table: SweepTable) -> Figure:
-    """Draw the panels over the fibre fraction, with the bounds that the results have.
+    """Draw panels with the first `len(MARKERS)` series over the fibre fraction, and the bounds that the results have.
 
     Generalized plane strain has further panels for Poisson's ratios and thermal expansions.
     """

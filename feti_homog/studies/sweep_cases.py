@@ -105,7 +105,7 @@ def cases_at(
         complete: sets further keys in the document of every case.
 
     Raises:
-        CaseError: with the faults of the points, or else of all cases, with the numbers of the faulty cases.
+        CaseError: points are faulty; or else cases are, named by their numbers, or their stress units differ.
     """
     lines = [*faults]
     unchecked = case_documents(document, points, realisations, lines, section)

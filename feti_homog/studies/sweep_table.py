@@ -42,7 +42,7 @@ class Statistics:
 
 @dataclass(frozen=True, repr=False)
 class SweepTable:
-    """The table of a sweep, with a row for each case.  See `pandas.DataFrame({**table.inputs, **table.outputs})`.
+    """The table of a sweep, a row for each case; as a frame: `pandas.DataFrame({**table.inputs, **table.outputs})`.
 
     Attributes:
         name, stress_unit: as in the sweep.

@@ -111,7 +111,7 @@ class FollowedResponse:
     def blocks(self, pairs: Int) -> Float:
         """Return the diagonal blocks (m, 2, 2) of Gamma at global row pairs (m, 2).  Collective.
 
-        Both rows of a pair belong to one rank; they have columns, which count as used.
+        Both rows of a pair must belong to one rank and have columns, which then count as used at the present change.
         """
         assert not len(self.lacking(pairs))
         places, at, n = pairs - self._first, self._slot[pairs], self._count

@@ -115,7 +115,7 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) first boundary dof of every subdomain, and n.
         local_dofs: (n,) numbers of the boundary dofs among all dofs of this rank.
         operators: for every subdomain, S and S+ as dense matrices or by sparse factors.
-        with_springs: for every subdomain, S~ and S+ + C of the body with its springs, for preconditioners.
+        with_springs: for every subdomain, S~ and flexibility of the body with its springs, see `with_springs.py`.
         facewise: for every subdomain, whether soft modes are computed face by face.
         B, BT: (local rows, n) constraints, and their transpose.
         body_diagonal: (n,) diagonal of K.
@@ -232,7 +232,7 @@ class InterfaceOperators:
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """Collect the unit loads of the local subdomains: q (n, v), and the sums of C and of energies, (v, v)."""
+        """The `CondensedLoads` of all local subdomains together, computed when first read."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])

@@ -149,7 +149,7 @@ class ContactProblem:
         return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return the state with amplitudes alpha and jumps by the dual operator.  Collective.
+        """Return the state with jumps and rigid-body amplitudes alpha, from its multipliers.  Collective.
 
         Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha stays unchanged.
         """

@@ -1,4 +1,4 @@
-"""Coulomb friction on n debonded nodes, by dense arrays: statuses of states and of rates.
+"""Coulomb friction on n debonded nodes, by dense arrays: find admissible states, and their rates.
 
 The jumps g = (g_n, g_t) of the nodes and the macroscopic strains E are the unknowns x = (g, E) of the energy
 x.S x / 2: the forces on the nodes are f = -(S x)_g, tension positive, and (S x)_E works on the strains.  With the
@@ -7,8 +7,8 @@ pressure p = -f_n
     g_n >= 0,  p >= 0,  g_n p = 0,        |f_t| <= mu p,  f_t = s mu p where the slip grows with the sign s.
 
 A node is apart (f = 0), sticks (g_n = 0, g_t unchanged), or slides (g_n = 0, f_t = s mu p).  S includes springs between
-the faces of a node, and f excludes their force: a damaged bond is a node without friction on springs 1 / (C - C_0),
-apart while the bond is under tension.
+the faces of a node, and f excludes their force: a damaged bond is a node on springs 1 / (C - C_0), apart while the bond
+is under tension; mu is 0 there, unless damage brings friction.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
 class StuckError(NotCarriedError):
-    """A state has no continuation: the search finds no admissible statuses of the debonded faces."""
+    """A state has no continuation: no admissible statuses of the faces resist, or the statuses change without end."""
 
 
 class CoulombFaces(FaceSystem):
@@ -76,7 +76,7 @@ class CoulombFaces(FaceSystem):
     def step(self, status: Status, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find the statuses (n,) and x (m,) at the end of an implicit step to a load; arguments as in `search`.
 
-        Raises as `search` does, and StuckError if det M is negative, and positive for no other admissible statuses.
+        Raises as `search` does, and StuckError if det M (`status_system`) is negative, also after Lemke's method.
         """
         return self._resisting(status, self.all_allowed(), load, start)
 

@@ -25,12 +25,12 @@ UNBALANCED = 1e-7
 
 @dataclass(frozen=True)
 class Prescribed:
-    """The prescribed loads, and the slips at the sticking nodes.
+    """The prescribed loads, and the slips from which the nodes start, all scaled as x.
 
     Attributes:
         by_stress: (v,) whether a load prescribes the stress.
         values: (v,) strains, or (S x)_E where a load prescribes the stress.
-        slip: (n,) slip at sticking nodes.
+        slip: (n,) slip of a sticking node; the slip of another node grows from it.
         pressure: (n,) scaled pressure added at the nodes; 0 except in a search.
     """
 
@@ -46,7 +46,7 @@ class FaceSystem:
     Attributes:
         friction: (n,) mu.
         S: (m, m) scaled stiffness of x = (g, E), with 1 as the largest diagonal entry of each node.
-        size: (m,) units, m = 2n + v: the stiffness is S_ij size_i size_j.
+        size: (m,) scales, m = 2n + v: jumps and strains are x / size, the stiffness is S_ij size_i size_j.
         nodes: number n of nodes.
         gaps, slips, loads: slices of g_n, g_t and the v loads E in x.
     """
@@ -72,7 +72,7 @@ class FaceSystem:
         return f[self.gaps], f[self.slips]
 
     def rooms(self, status: Status, x: Float, slip: Float | float, pressure: Float | float) -> Float:
-        """Return how far nodes are from other statuses, forces and jumps (4, n); inf where another limit comes first.
+        """Return the force or jump (4, n) between each node and another status; inf without a direct change to it.
 
         The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with the added
         pressure; g_n is the room of an open node, in the row STICK.
@@ -91,7 +91,7 @@ class FaceSystem:
         )
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the factored response of `before`, changed in place by `FollowedStatuses.grow`, if it can grow."""
+        """Take over the response of `before`, useless afterwards, if `FollowedStatuses.grow(old, other)` extends it."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -168,7 +168,7 @@ class FaceSystem:
         return float(UNBALANCED * self._sizes(status, load).max(initial=0.0))
 
     def _sizes(self, status: Status, load: Prescribed) -> Float:
-        """Return the forces (m,) of the prescribed entries at each node and at the node's neighbours in S."""
+        """Bound the forces (m,) of prescribed loads and slips at each node, and at its neighbours in S."""
         # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed, rows = np.zeros((2, len(self.S)))
         rows[self.loads] = load.values

@@ -79,7 +79,7 @@ class CondensedProblem:
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the dual solution under jumps (n,) and strains (v,), with jumps by the dual operator.  Collective."""
+        """Return the dual solution under jumps (n,) and strains (v,); its jumps follow from F lam.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))

@@ -40,8 +40,8 @@ class StatusSearch:
     def by_pivots(self, status: Status) -> tuple[Found, bool]:
         """Correct wrong statuses by pivots: return the statuses with x, and whether the forces balance.
 
-        Returns (None, False) after SOLVES + 4 n pivots; forces of statuses that do not balance drive a free motion.
-        After some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
+        Forces that do not balance drive a free motion.  After SOLVES + 4 n pivots the result is (None, False).  After
+        some block pivots without progress, one random node changes at a time: a fixed order may end in a cycle.
         """
         fewest, pivots, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(SOLVES + self.allowed.size):
@@ -69,9 +69,9 @@ class StatusSearch:
     def by_lemke(self) -> Found:
         """Search by Lemke's method: admissible statuses under an added pressure that falls to zero.
 
-        Under a large added pressure d t, all faces that may touch stick.  As t falls, one node after another has to
-        change its status.  At a change, t goes on, down or up, in the direction in which the new status is admissible.
-        Statuses at t = 0 have a positive det M, or 0.  None: t rises without end, or after SOLVES + 4 n changes.
+        Under a large added pressure d t, all faces that may touch stick or, without friction, are FORWARD.  As t falls,
+        one node after another has to change its status; t then goes on, down or up, as the new status admits.  At the
+        end det M >= 0 (`status_system`).  None: t rises without end, after SOLVES + 4 n changes, or as in `_balanced`.
         """
         faces, load, rest = self.faces, self.load, np.zeros(len(self.start))
         # Nodes of a symmetric cell would reach limits together under equal pressures.
@@ -106,7 +106,7 @@ class StatusSearch:
         return None
 
     def _balanced(self, status: Status) -> Found:
-        """Return the statuses and x at the end of pivots; None if the forces do not balance."""
+        """Return the statuses and x by pivots; None if the pivots do not end, or the forces do not balance."""
         result, balanced = self.by_pivots(status)
         return result if balanced else None
 
@@ -117,7 +117,7 @@ class StatusSearch:
         return np.where(enters, self.faces.rooms(status, x, self.load.slip, pressure), np.inf)
 
     def _entered(self, target: FaceStatus, status: Status, x: Float) -> Status:
-        """Return the statuses (n,) of nodes without room up to `target`: faces that close slide as their slips grew."""
+        """Return new statuses (n,) for nodes without room up to `target`; closing faces slide as their slips grew."""
         if target != STICK:
             return np.full_like(status, target)
         slip = x[self.faces.slips] - self.load.slip

@@ -237,8 +237,8 @@ class FollowedStatuses:
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
         """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
 
-        The present entries change to the units `units` (m,), and S changes between the entries with the indices
-        `other`.  Return False if a pivot is too small; R is then useless.
+        New scales multiply the entries of S by units_i units_j, with `units` (m,); S also changes between the entries
+        with the indices `other`.  Return False if a pivot is too small; R is then useless.
         """
         # Prescribed entries have rows of the identity in M^-1: only the block of S M^-1 between these entries changes.
         entries, free, slope = np.flatnonzero(np.isin(old, other)), self.free.copy(), self.slope.copy()

@@ -1,12 +1,12 @@
 """Ends of a straight response: the first break of a bond, or the first contact change.
 
 The first bond of a linear cell breaks under tractions t0 + f t1, with load factor f.  The utilisation u is homogeneous
-of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula; for others u
-is convex along a ray, passes 1 once, and
+of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula.  In other
+laws, bonds need a search; but where u is convex along a ray, it passes 1 once, and
 
     (1 - u(t0)) / u(t1)  <=  f  <=  (1 + u(-t0)) / u(t1),
 
-because u is subadditive: only bonds with a lower bound below the smallest upper bound need a search.
+because u is subadditive: a bond whose lower bound exceeds the smallest upper bound breaks later, and needs no search.
 """
 
 from __future__ import annotations

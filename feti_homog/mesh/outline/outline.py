@@ -38,14 +38,14 @@ class Bridges:
 
 @dataclass(frozen=True)
 class Outline:
-    """The cell lines.
+    """The lines of a cell, divided by nodes: borders, interfaces and bridges.
 
     Attributes:
         points: (n, 2) exact positions of the nodes on all lines.
         curves: curves through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
-        disc: (k,) index of the fibre of each circle or ellipse.
-        around: (k,) the circle that surrounds each circle; MATRIX for a circle in the matrix.
+        disc: (k,) index of the fibre or void of each circle or ellipse.
+        around: (k,) index of the circle or ellipse around each one, MATRIX in the matrix.
     """
 
     points: Float

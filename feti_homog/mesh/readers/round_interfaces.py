@@ -78,8 +78,8 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
     A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
     the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
     of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
-    third edge flips in triangles with two edges on one ellipse. A remark names other interfaces, without middle nodes,
-    within NEARLY_ROUND.
+    third edge flips in triangles with two edges on one ellipse. A remark names interfaces that are only within
+    NEARLY_ROUND and have no middle nodes.
     """
     nodes = len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]

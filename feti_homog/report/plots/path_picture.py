@@ -32,9 +32,9 @@ AREAS = {
 
 
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw stresses, or strains without stress, and interface states against the leading strain, with the landmarks.
+    """Draw stresses (strains if no stress acts) and interface states over the leading strain, with the landmarks.
 
-    A panel between the two shows the change of temperature, if any, or all panels have it as axis, if it varies alone.
+    A panel between the two shows the change of temperature, if any; if it varies alone, it is the axis of all panels.
     Selected points carry their numbers.
     """
     points, case = document["path"], document["case"]
@@ -96,7 +96,7 @@ def _axis_label(axis: str) -> str:
 
 
 def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, Any]) -> bool:
-    """Draw stresses, or without stress strains, of a path over the quantity `axis`; return whether it has stresses.
+    """Draw the stresses of a path, or the strains if no stress acts, over `axis`; return whether it has stresses.
 
     Thin lines show the first leg with its snap-back; thick lines show the response to a controlled load, on all legs.
     On later legs lines end at a break if the state behind it is unknown.
@@ -229,10 +229,10 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
 def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
     """Return `ENERGIES`, load factor and axis (n,) at drawn positions along `points`, from the unloaded cell on.
 
-    Energies are quadratic along the straight way to a point ('), on the first leg a ray through zero.  The break before
-    loses energy at one load, and has no work or, under given stresses alone, twice the loss.  The slope of the work at
-    an end is S dE + C dT, with the conjugate C of the temperature T in twice the stored energy, S E + C T; under given
-    stresses it is dS E'.
+    Energies are quadratic along the straight way to a point ('), which is a ray through zero on the first leg.  The
+    break before this way loses energy at one load; its work is 0 or, under given stresses alone, twice the loss.  The
+    slope of the work at an end is S dE + C dT or, under given stresses, dS E'.  Twice the stored energy, S E + C T,
+    gives the conjugate C of the temperature T.
     """
     path, legs, axis = document["case"]["path"], path_curves.legs(document), path_curves.abscissa(document)[0]
     table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}
