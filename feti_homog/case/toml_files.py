@@ -46,6 +46,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         hint = "; numbers have no unit, and a decimal point" if re.match(r"[^=]*=\s*[-+.]*\d[^=]*$", text) else ""
         if "overwrite" in words:
             hint = f"; {text.partition('=')[0].strip()} is given twice"
+        elif "immutable namespace" in words:
+            hint = f'; a section with a value has its keys in quotation marks: "{text.partition("=")[0].strip()}"'
         elif re.match(r"[^=]*=\s*[A-Za-z]", text):
             hint = "; text needs quotation marks, true and false do not"
         quoted = f": {wording.toml_value(text)}{hint}" if text else ""

@@ -20,7 +20,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES = {
     ".": 470 + 18 + 0,
     "analysis": 3000 + 139 + 75,
-    "case": 2880 + 34 + 120,
+    "case": 2880 + 36 + 120,
     "commands": 560 + 10 + 31,
     "fem": 1150 + 3 - 12,
     "feti": 6300 + 8 + 60,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 157 + 75,
 }
-FILES, TOTAL = 310, 45000 + 782 + 1132
+FILES, TOTAL = 310, 45000 + 784 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

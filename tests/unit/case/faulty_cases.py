@@ -15,6 +15,7 @@ NOT_TOML: dict[str, str] = {
     '"mesh_size = 3 mm"; numbers have no unit, and a decimal point': cell("mesh_size = 0.05", "mesh_size = 3 mm"),
     '"mesh_size = 0,05"; numbers have no unit, and a decimal point': cell("mesh_size = 0.05", "mesh_size = 0,05"),
     '"mesh_size = small"; text needs quotation marks': cell("mesh_size = 0.05", "mesh_size = small"),
+    'has its keys in quotation marks: "cell.refine"': ended("[sweep]\ncell = [{order = 1}]\ncell.refine = [0, 1]\n"),
     "not TOML: Cannot declare ('cell',) twice (at line 17": ended("[cell]\n"),
     "not TOML": cell("0.05", "1" * 5000),
 }  # fmt: skip
