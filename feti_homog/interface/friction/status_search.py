@@ -63,7 +63,8 @@ class StatusSearch:
         better, noise = status.copy(), self.faces.noise(x)
         wrong = self._rooms(status, x) < -noise
         for target in (FORWARD, BACKWARD, STICK, OPEN_FACE):
-            better[wrong[target]] = self._entered(target, status, x)[wrong[target]]
+            if wrong[target].any():
+                better[wrong[target]] = self._entered(target, status, x)[wrong[target]]
         return better
 
     def by_lemke(self) -> Found:
