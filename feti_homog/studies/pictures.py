@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.report.plots import plot_helpers
 from feti_homog.report.text import tables
-from feti_homog.results import path_curves
+from feti_homog.results import landmarks, path_curves
 from feti_homog.studies.sweep_table import Series, SweepTable, series_over, varies
 from feti_homog.typing import Document
 
@@ -55,7 +55,8 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)
-    peaks = [name for name in table.stated if name.startswith("peak_S")]
+    leading = {landmarks.peak_of(result)["stress_name"] for result in table.finished if "path" in result}
+    peaks = [f"peak_{name}" for name in sorted(leading) if f"peak_{name}" in table.stated]
     onsets = [name.replace("peak", "onset") for name in peaks]
     choices = (*choices, tuple(onsets if table.rising else onsets + peaks))
     return next((names for names in choices if all(name in table.outputs for name in names)), ())

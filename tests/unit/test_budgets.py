@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 109,
     "results": 2430 + 223 + 35,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 127 + 2,
+    "studies": 2950 + 128 + 2,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 157 + 75,
 }
-FILES, TOTAL = 310, 45000 + 785 + 1132
+FILES, TOTAL = 310, 45000 + 786 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
