@@ -201,7 +201,10 @@ COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "disp
 
 
 class Section(dict[str, Any]):
-    """A table of result.json that records the entries that laws read.  ATOMS count as one entry."""
+    """A table of result.json that records the entries that laws read.  ATOMS count as one entry.
+
+    `places` has the names of all entries in the outermost table, and none in tables inside.
+    """
 
     def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:
         super().__init__(content)
@@ -215,7 +218,7 @@ class Section(dict[str, Any]):
                 self[key] = [Section(entry, self.unread, f"{inner}[{k}]") for k, entry in enumerate(value)]
             else:
                 self.unread[inner] = False
-        self.places = tuple(self.unread)
+        self.places = tuple(self.unread) if unread is None else ()
 
     def __getitem__(self, key: str) -> Any:
         if self.unread.get(self._prefix + key) is False:

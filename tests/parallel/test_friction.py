@@ -149,6 +149,24 @@ def test_a_load_passes_through_zero(comm, seed, mesh_size, friction):
     assert np.abs(work - sum(parts)).max() < 1e-10 * energies.max() and (np.diff(energies[:, 3]) >= -1e-14).all()
 
 
+@pytest.mark.one_rank
+def test_increments_reach_zero_load(comm):
+    """Where no face of the loose fibres carries a force, and slips may have any direction."""
+    cell = {"geometry": "random", "fibre_fraction": 0.3, "fibres": 8, "seed": 4, "mesh_size": 0.12}
+    interface = {"normal_strength": 25.0, "tangential_strength": 30.0, "friction": 1.2}
+    waypoints = [
+        {"E11": 0.01, "S22": -20.0},
+        {"E11": -0.01, "S22": 0.0},
+        {"gamma12": 0.02},
+        {"E11": 0.0, "gamma12": 0.0},
+    ]
+    path = {"waypoints": waypoints, "method": "increments", "increments": 80}
+    phases = ({"young": 3000.0, "poisson": 0.35}, {"young": 70000.0, "poisson": 0.22})
+    points = solved(comm, cell=cell, phases=phases, plane="strain", interface=interface, path=path).path
+    assert points[-1].load_factor == 1.0
+    assert np.abs(points[-1].stress).max() < 1e-9 * max(np.abs(point.stress).max() for point in points)
+
+
 @pytest.mark.parametrize(("friction", "under_pressure"), [({}, 1), ({"friction": 0.3}, 0)], ids=["smooth", "friction"])
 def test_a_fibre_that_nothing_touches_moves_freely_and_one_under_pressure_turns(comm, friction, under_pressure):
     case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "interface": WHOLE | friction}

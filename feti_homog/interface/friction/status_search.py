@@ -61,7 +61,9 @@ class StatusSearch:
     def _improved(self, status: Status, x: Float) -> Status:
         """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
         better, noise = status.copy(), self.faces.noise(x)
-        wrong = self._rooms(status, x) < -noise
+        rooms = self._rooms(status, x)
+        wrong = rooms < -noise
+        wrong[STICK] &= rooms[OPEN_FACE] > noise  # without pressure, a slip may have either sign
         for target in (FORWARD, BACKWARD, STICK, OPEN_FACE):
             if wrong[target].any():
                 better[wrong[target]] = self._entered(target, status, x)[wrong[target]]

@@ -128,3 +128,11 @@ def test_a_tolerance_that_the_case_does_not_name_is_listed(results, tmp_path):
     document["solver"]["rtol"], document["check_tolerance"] = 1e-9, 1e-6
     certificate = verify(resealed(results("plane"), tmp_path / "copy", document))
     assert certificate.holds and any("solver.rtol" in names for names in certificate.unchecked.values())
+
+
+def test_the_names_of_entries_take_memory_in_proportion_to_the_points() -> None:
+    """Each of 20 000 points holds its own names alone: all names in each would be 800 million."""
+    document = Section({"path": [{"work": float(k), "stored": 0.0} for k in range(20_000)]})
+    points = document.hint("path")
+    assert len(document.places) == 40_000 and not any(point.places for point in points)
+    assert points[7]["work"] == 7.0 and "path[7].work" not in document.unread and "path[8].work" in document.unread
