@@ -118,6 +118,7 @@ class CoulombFaces(FaceSystem):
         """Return the time until a node leaves its status while x changes at `rate`; inf if no node does."""
         rooms, rates = self.rooms(status, x, x[self.slips], 0.0), self.rooms(status, rate, 0.0, 0.0)
         falls = rates < -self.noise(rate)
+        falls[STICK] &= status == OPEN_FACE  # only faces without pressure slip against their sign
         return float((np.maximum(rooms[falls], 0.0) / -rates[falls]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
