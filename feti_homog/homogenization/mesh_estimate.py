@@ -83,10 +83,10 @@ def energy_errors(
     nested: bool | None = None,
     zones: TipZones | None = None,
 ) -> EnergyErrors:
-    """Estimate the mesh errors of k responses in one problem, with the same intact bonds.  Collective.
+    """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
-        contact: whether faces touch.
+        responses, contact: the responses, all to the same intact bonds, and whether faces touch.
         nested: whether to use the coarser mesh; by default the result of `is_nested`.
         zones: about the tips of debonded responses; found here by default.
     """

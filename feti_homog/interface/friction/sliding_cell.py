@@ -73,7 +73,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
-        """Compute `multipliers` in some owned rows (k, c).  Another call with the same array reuses the columns."""
+        """Compute `multipliers` in owned rows (k, c), with stored columns if `rows` is the array of the last call."""
         if self._some is None or self._some[0] is not rows:
             self._some = rows, self._columns[rows.ravel()]
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)

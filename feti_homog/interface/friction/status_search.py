@@ -60,9 +60,8 @@ class StatusSearch:
 
     def _improved(self, status: Status, x: Float) -> Status:
         """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
-        better, noise = status.copy(), self.faces.noise(x)
-        rooms = self._rooms(status, x)
-        wrong = rooms < -noise
+        rooms, noise = self._rooms(status, x), self.faces.noise(x)
+        better, wrong = status.copy(), rooms < -noise
         wrong[STICK] &= rooms[OPEN_FACE] > noise  # without pressure, a slip may have either sign
         for target in (FORWARD, BACKWARD, STICK, OPEN_FACE):
             if wrong[target].any():

@@ -59,7 +59,7 @@ def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
 
 
 def test_the_deepest_fall_is_below_the_largest_stress_before_it() -> None:
-    """Saw teeth within the fall, of which none is as deep as the last fall."""
+    """Saw teeth divide the fall, and the last fall is deeper than each tooth."""
     teeth = [10.0, 27.0, 23.0, 25.0, 20.7, 31.0, 39.5, 35.1, 38.8]
     points = [point(n / 9, 90 * s / n) for n, s in enumerate(teeth, 1)]
     found = peak_of(document("increments", 1, points))
