@@ -27,7 +27,7 @@ from feti_homog.system.runtime import file_locks, input_files
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE = output_folder.STUDIES[0], "cases.csv", "error.txt"
 CASE_FILE, LOCK_FILE = "case.toml", "lock"
-SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
+SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|(moduli|peaks)\.png|report\.html|case-\d{4,}")
 """Files and folders that a sweep and its collection write beside sweep.json."""
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 

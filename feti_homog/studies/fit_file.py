@@ -156,10 +156,10 @@ def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]
     head = lines[0][1] if lines else ""
     delimiter = table_columns.delimiter_of(head)
     heads = table_columns.cells_of(head, delimiter)
-    names = voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES
-    strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
+    kinds = voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES
+    strains, stresses = ([k for k, head in enumerate(heads) if head in names] for names in kinds)
     if (len(strains), len(stresses)) != (1, 1):
-        raise CaseError(f"{path}: expected one column of a strain, such as E11, and one of a stress, such as S11")
+        raise CaseError(f"{path}: {wording.toml_value(head)}: expected names of one strain and one stress: E11,S11")
     if not 1 < len(lines) <= types.MOST_ROWS + 1:
         raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {types.MOST_ROWS}")
     rows = list[tuple[float, float]]()

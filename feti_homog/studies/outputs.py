@@ -13,7 +13,6 @@ from feti_homog.results import landmarks, path_curves, result_json
 from feti_homog.system.runtime import records
 from feti_homog.typing import Document
 
-PHASES_OF_ONE_FIBRE = 2
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")  # measures of phase stresses
 CONDUCTIVITIES = tuple(f"k{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 Column = result_json.DescribedColumn
@@ -35,7 +34,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
     values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
-    if len(fractions) > PHASES_OF_ONE_FIBRE:
+    if len(fractions) > 2:  # besides matrix and fibre
         values |= {f"fraction_{phase}": fraction for phase, fraction in fractions.items()}
     if cell.get("porosity"):
         values["porosity"] = cell["porosity"]
@@ -54,12 +53,12 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
         if (onset := next((p for p in path if p["broke"] or p.get("softened")), None)) is not None:
             values |= {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
             values |= {"onset_temperature": onset["temperature"]} if "temperature" in onset else {}
-        values |= _at_point("end", path[-1]) | {name: path[-1][name] for name in ("dissipated", "work")}
+        values |= _at_point("end", path[-1]) | {f"end_{state}": path[-1][state] for state in point_tables.STATES}
+        values |= {name: path[-1][name] for name in ("dissipated", "friction_heat", "work") if name in path[-1]}
         largest = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
         if "event" in (peak := landmarks.peak_of({**document, "path": path})):
             values |= {f"peak_{name}": value for name, value in zip(stresses, largest.tolist(), strict=True)}
             values |= {f"peak_{peak[f'{kind}_name']}": peak[kind] for kind in ("stress", "strain")}
-        values |= {f"end_{state}": path[-1][state] for state in point_tables.STATES}
     if envelope := document.get("envelope"):  # first axis, least and largest factor
         first, second = document["case"]["envelope"]["plane"]
         factors = sorted(point["factor"] for point in envelope if "factor" in point)
@@ -182,6 +181,7 @@ OUTPUT_COLUMNS = (
     Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
     Column("onset_temperature", "temperature", "change of temperature there, in generalized plane strain"),
     Column("dissipated", records.STRESS, "energy lost to all breaks of a path, per area of the cell"),
+    Column("friction_heat", records.STRESS, "energy lost to friction along a path, per area of the cell"),
     Column("work", records.STRESS, "work of the loads along a path, per area of the cell"),
     Column("onset_Sij", records.STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
     Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),

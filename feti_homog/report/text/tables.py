@@ -9,7 +9,7 @@ from typing import Any
 from feti_homog.typing import Document
 
 STRESSES = ("young", "stiffness", "normal_strength", "tangential_strength", "axial_strength", "tractions",
-           "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
+           "dissipated", "dissipated_strain_controlled", "friction_heat", "work", "load_stored")  # fmt: skip
 MODULI = re.compile(
     r"E[123]|G\d\d|[EGK]_(axial|transverse)|(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d"
     r"|(.+_)?(principal|von_mises|hydrostatic)|((axial|transverse)_)?(tension|compression)|(axial|transverse)_shear"

@@ -47,13 +47,14 @@ def test_curves_of_a_given_stress_have_six_components(tmp_path):
 
 def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
     path = path_document(2, 0.0)
-    path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2}
+    path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2, "friction_heat": 0.7}
     found = outputs(path)
     assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, 4.0, -7.0]
     assert found["peak_E11"] == pytest.approx(0.02)  # whose stress falls behind it
     assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
     assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
     assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
+    assert found["friction_heat"] == 0.7 and "friction_heat" not in outputs(path_document(2, 0.0))
     path["path"] = [point | {"broke": 0} for point in path["path"]]
     assert {*found} - {*outputs(path)} == {name for name in found if name.startswith("onset_")}
     path["path"][1]["softened"] = 1

@@ -78,7 +78,7 @@ def test_a_full_device_is_reported():
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
 
 
-OWN = ["cases.csv", "lock", "statistics.csv", "moduli.png", "case-0001/notes.txt"]
+OWN = ["cases.csv", "lock", "statistics.csv", "moduli.png", "peaks.png", "case-0001/notes.txt"]
 
 
 @pytest.mark.parametrize("name", OWN)
