@@ -29,7 +29,7 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     width = max(len(state.status) for state in states)
     for entry, state in zip(sweep.entries, states, strict=True):
         line = f"{entry.folder}  {state.status:<{width}}  {entry.describe(sweep.stress_unit)}".rstrip()
-        lines.append(f"{line}; {state.reason}" if state.reason and state.status in case_folders.BEGUN else line)
+        lines.append(f"{line}; {state.reason}" if state.reason and not state.status.is_failure else line)
     return lines
 
 

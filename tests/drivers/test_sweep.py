@@ -60,6 +60,9 @@ def test_list_tells_cases_and_their_state(tmp_path):
     job = in_process("sweep", path, "--out", out, "--list")
     assert [line.split()[1] for line in job.stdout.splitlines()] == ["waiting", "done"]
     assert len(list(tmp_path.glob("**/result.json"))) == 1
+    other = sweep_file(tmp_path, TWO + "material.matrix.young = [81.0]\n")
+    job = in_process("sweep", other, "--out", out, "--list")
+    assert job.stdout.splitlines()[1].endswith(f"81.0 GPa; {out}/case-0002/result.json is of another case")
 
 
 @pytest.mark.parametrize(
