@@ -67,13 +67,19 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3): q = -k grad T in cell axes.  ValueError unless k is given, symmetric and positive definite."""
+    """Return k (3, 3): q = -k grad T in cell axes.  ValueError unless k is given, symmetric and positive definite.
+
+    A tensor of an orthotropic material is turned from the material axes.
+    """
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
     if isinstance(k, material_forms.FibreConductivity):
         return np.diag([k.transverse, k.transverse, k.axial])
-    return k * np.eye(3) if isinstance(k, float) else _positive_definite("conductivity", _symmetric("conductivity", k))
+    if isinstance(k, float):
+        return k * np.eye(3)
+    R, along_axes = voigt.turned_axes(_angle(material)), _symmetric("conductivity", k)
+    return np.asarray(R @ _positive_definite("conductivity", along_axes) @ R.T)
 
 
 def isotropic_ratio(material: material_forms.Material) -> float | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from feti_homog.materials import material_forms
 from feti_homog.materials.engineering_constants import constants
 from feti_homog.materials.laws import COUPLINGS, conductivity, expansion, known_compliance, stiffness_of
-from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
+from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation, turned_axes
 from feti_homog.typing import Float
 
 STEP = 1e-30  # the square vanishes beside 1 in rounding
@@ -48,7 +48,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
     """Yield a `LawChange` for each constant and, in space, expansion.  Raises as `stiffness_of` and `expansion`."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
-        yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
+        yield from (LawChange(name, value, change, none) for name, value, change in _of_conduction(material))
         return
     changes = _of_entries if isinstance(material, material_forms.General) else _of_constants
     for name, value, change in changes(material, plane, C):
@@ -102,18 +102,24 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield name ending, value and dk (3, 3) for each conductivity in the cell's axes."""
+    """Yield name, value and dk (3, 3) in cell axes for each conductivity, and for the angle of a tensor."""
     k = material.conductivity
     if isinstance(k, material_forms.FibreConductivity):
-        yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])
-        yield ".transverse", k.transverse, np.diag([1.0, 1.0, 0.0])
+        yield "conductivity.axial", k.axial, np.diag([0.0, 0.0, 1.0])
+        yield "conductivity.transverse", k.transverse, np.diag([1.0, 1.0, 0.0])
     elif isinstance(k, float):
-        yield "", k, np.eye(3)
+        yield "conductivity", k, np.eye(3)
     else:
+        angle, tensor = getattr(material, "angle", 0.0), np.array(k)
+        R = turned_axes(angle)
         for i, j in zip(*np.triu_indices(3), strict=True):
             unit = np.zeros((3, 3))
             unit[[i, j], [j, i]] = 1.0
-            yield f".k{i + 1}{j + 1}", float(conductivity(material)[i, j]), unit
+            yield f"conductivity.k{i + 1}{j + 1}", float(tensor[i, j] + tensor[j, i]) / 2, R @ unit @ R.T
+        if isinstance(material, material_forms.Orthotropic):
+            turn = np.zeros((3, 3))
+            turn[:2, :2] = TURN[3:5, 3:5]
+            yield "angle", angle, turn @ conductivity(material) - conductivity(material) @ turn
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:

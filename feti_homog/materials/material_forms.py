@@ -68,9 +68,7 @@ CONDUCTIVITY = types.either(
     types.table_of(FibreConductivity, ""),
     types.list_of(types.list_of(types.real(), "", count=3), "", count=3),
 )
-CONDUCTS = (
-    'The same in all directions, along x3 and in the plane, or the tensor; type = "conductivity" needs this key alone.'
-)
+CONDUCTS = "In all directions, by x3 and the plane, or the tensor in material axes; conduction needs no other key."
 Conductivity = float | FibreConductivity | Matrix
 
 

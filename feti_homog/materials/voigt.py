@@ -83,9 +83,10 @@ def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
-def strain_tensor(strain: Float) -> Float:
-    """Return the tensor (2, 2) of a strain (3,): E12 = gamma12 / 2."""
-    return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+def turned_axes(angle: float) -> Float:
+    """Return the matrix R (3, 3) whose columns are the axes turned about x3 by `angle` degrees."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def rotated(stiffness: Float, angle: float) -> Float:
@@ -100,8 +101,7 @@ def rotated(stiffness: Float, angle: float) -> Float:
 
 def strain_rotation(angle: float) -> Float:
     """Return the matrix T (6, 6) that transforms strains to axes turned about x3 by `angle` degrees."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    rotation = np.eye(6)
+    rotation, (c, s, _) = np.eye(6), turned_axes(angle)[:, 0]
     rotation[IN_PLANE_BLOCK] = [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
     rotation[3:5, 3:5] = [[c, -s], [s, c]]  # of [gamma23, gamma13]
     return rotation

@@ -66,7 +66,8 @@ def _parameters(cell: DiscreteCell) -> set[str]:
     material, conducts = cell.files.case["material"], "effective_conductivity" in document
     pairs = [(phase, key) for phase in {*cell.files.phases} & material.keys() for key in material[phase]]
     for phase, key in pairs:
-        if (key == "conductivity") is not conducts or key == "strength":
+        turns_conductivity = conducts and key == "angle" and np.ndim(material[phase]["conductivity"]) == 2
+        if (key == "conductivity" or turns_conductivity) is not conducts or key == "strength":
             continue
         if "thermal_stress" in document or not key.startswith("expansion"):
             value = material[phase][key]

@@ -25,15 +25,16 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float]:
     """
     plane, stiffnesses, expansions = case["analysis"]["plane"], list[Float](), list[Float]()
     for constants in (phase_constants(case, phase) for phase in phases):
+        angle = float(constants.get("angle", 0.0))
         if plane == "conduction":
             # C_3i3j = k_ij for a displacement along x3 alone; the rest is arbitrary, of the size of k.
             k: Any = constants["conductivity"]
             tensor = np.array([k["transverse"], k["transverse"], k["axial"]] if isinstance(k, Mapping) else k, float)
             tensor = tensor * np.eye(3) if tensor.ndim < 2 else tensor
             stiffnesses.append(np.abs(tensor).max() * np.eye(6))
-            stiffnesses[-1][np.ix_(GRADIENT, GRADIENT)] = (tensor + tensor.T) / 2
+            stiffnesses[-1][np.ix_(GRADIENT, GRADIENT)] = _turn(angle, 3) @ (tensor + tensor.T) / 2 @ _turn(angle, 3).T
             continue
-        angle, law = float(constants.get("angle", 0.0)), _given_stiffness(constants)
+        law = _given_stiffness(constants)
         if len(law) != 3:
             law = law if len(law) else np.asarray(np.linalg.inv(_compliance(constants)), float)
             if plane == "stress":

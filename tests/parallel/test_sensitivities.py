@@ -50,7 +50,8 @@ CASES = {
         SPRINGS,
     ),
     "conduction": document(
-        PLAIN | {"order": 2}, "conduction", {"matrix": {"conductivity": TENSOR}, "fibre": {"conductivity": ACROSS}},
+        PLAIN | {"order": 2}, "conduction",
+        {"matrix": TURNED | {"conductivity": TENSOR}, "fibre": {"conductivity": ACROSS}},
         {"conductance": 0.7, "debonded": ARC},
     ),
     "conduction with coatings": document(

@@ -6,8 +6,8 @@ from support.cases import make_case
 
 from feti_homog import Case
 from feti_homog.homogenization import phase_laws
-from feti_homog.materials.laws import out_of_plane, stiffness_of
-from feti_homog.materials.material_forms import Isotropic
+from feti_homog.materials.laws import conductivity, out_of_plane, stiffness_of
+from feti_homog.materials.material_forms import Isotropic, Orthotropic
 from feti_homog.materials.voigt import CONDUCTION, PLANE_STATES, plane_state_of
 
 MECHANICAL = {name: state for name, state in PLANE_STATES.items() if not state.is_scalar}
@@ -47,6 +47,14 @@ def test_conduction_has_the_gradient_of_one_unknown():
     assert plane_state_of({"case": case.resolved()}) is CONDUCTION and Case.parse(case.resolved()) == case
     assert phase_laws.law(case, "matrix", problem).tolist() == (0.2 * np.eye(3)).tolist()
     assert phase_laws.law(case, "fibre", problem).tolist() == np.diag([1.0, 1.0, 10.0]).tolist()
+
+
+def test_an_orthotropic_phase_conducts_best_along_its_axis():
+    """The flux k' = diag(3, 1, 2) along axis 1, at 30 degrees from x1, is three times the gradient."""
+    tensor = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.0))
+    k = conductivity(Orthotropic(E1=2.0, E2=1.0, nu12=0.2, G12=0.5, angle=30.0, conductivity=tensor))
+    axis = np.array([np.sqrt(3) / 2, 0.5, 0.0])
+    assert k @ axis == pytest.approx(3.0 * axis) and np.linalg.eigvalsh(k) == pytest.approx([1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize(("name", "S33"), [("stress", 0.0), ("strain", 0.3)])

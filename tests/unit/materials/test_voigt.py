@@ -5,11 +5,7 @@ import numpy as np
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE
 from feti_homog.homogenization.phase_laws import AXIAL_SHEAR, IN_PLANE
 from feti_homog.materials import voigt
-from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS, strain_tensor
-
-
-def test_the_tensor_has_half_of_the_engineering_shear():
-    np.testing.assert_array_equal(strain_tensor(np.array([1.0, 2.0, 3.0])), [[1.0, 1.5], [1.5, 2.0]])
+from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 
 
 def test_names_are_those_of_the_unit_loads():
