@@ -140,23 +140,31 @@ def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
 
 
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
-    """Return a line for each phase that passes its strength up to the peak.
+    """Return a line for each phase that passes its strength, on a path with a peak only before the peak.
 
-    The lines give stress and strain, or the temperature if only this changes.  Utilisations at the kept points
-    `numbers` are interpolated linearly, from 0 on.
+    The lines give stress and strain, or the temperature if only this changes.  On the first leg, where stresses are
+    proportional to the load but for breaks, utilisations at the kept points `numbers` are interpolated; on later legs
+    the lines give the kept points before and after.
     """
-    lines, table = list[str](), path_curves.table_of([document["path"][number] for number in numbers])
-    subject = ", before the largest stress of the path, which" if "event" in peak else "; the path"
+    lines, stress, leg = list[str](), path_curves.stresses(document), path_curves.legs_of(document)
+    table = path_curves.table_of([document["path"][number] | {"stress": stress[number]} for number in numbers])
+    last, subject = numbers[-1], "; the path"
+    if name_of(document, peak) == PEAK:
+        last, subject = peak["event"], ", before the peak of the path, which"
     for phase in document.get("phase_stresses", ()):
         ratios = [0.0, *phase.get("utilisation", ())]
         k = next((k for k, ratio in enumerate(ratios) if ratio >= 1.0), 0)
-        if k and numbers[k - 1] <= peak.get("event", numbers[-1]):
+        if k and numbers[k - 1] <= last:
             is_thermal = path_curves.temperature_of(document, numbers[k - 1]) is not None
             names = ("temperature",) if is_thermal else (peak["stress_name"], peak["strain_name"])
-            ends = slice(k - 1, k + 1)
-            places = [f"{name} = {np.interp(1.0, ratios[ends], [0.0, *table[name]][ends]):.4g}" for name in names]
-            passed = f"the utilisation reaches 1 at about {', '.join(places)}"
-            lines.append(f"[material.{phase['phase']}] strength: {passed}{subject} takes the phase as elastic beyond")
+            ends = {name: [0.0, *table[name]][k - 1 : k + 1] for name in names}
+            if leg[numbers[k - 1]] == 1:
+                share = ratios[k - 1 : k + 1]
+                places = [f"at about {name} = {np.interp(1.0, share, pair):.4g}" for name, pair in ends.items()]
+            else:
+                places = [f"between {name} = {a:.4g} and {b:.4g}" for name, (a, b) in ends.items()]
+            passed = f"[material.{phase['phase']}] strength: the utilisation reaches 1 {', '.join(places)}"
+            lines.append(f"{passed}{subject} takes the phase as elastic beyond")
     return lines
 
 
