@@ -252,7 +252,7 @@ class Cell:
         'so that the cell sides cut them well, unless a file gives left and bottom. "cut", for tables: a window of a '
         "larger section, whose fibres may overlap across the border; these move apart as little as possible, and "
         'fibres with centres outside are left out. "mirrored", for images: the cell is the image with its three mirror '
-        "images, beside it, above it, and diagonally across.",
+        "images, beside it, above it, and diagonally across; tension and shear are then uncoupled.",
         default="periodic",
         only=GEOMETRY.among("table", "pixels"),
     )

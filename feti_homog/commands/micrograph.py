@@ -44,6 +44,6 @@ def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
     rim = circles[:, :2] + circles[:, 2:] * image_circles.RIM[:, None]
     axes.plot(rim[..., 0], rim[..., 1], color="tab:orange", linewidth=1.5)
     share = np.pi * (circles[:, 2] ** 2).sum() / (width * height)
-    title = f"{len(circles)} fibres; whole circles have {100 * share:.3g} % of the area"
+    title = f"{len(circles)} fibres; circles, with their parts outside, have {100 * share:.3g} % of the area"
     axes.set(xlim=(0.0, width), ylim=(0.0, height), xlabel="x", ylabel="y", title=title)
     return str(plot_helpers.save(figure, picture))

@@ -103,7 +103,7 @@ def test_circles_of_a_wide_image_are_drawn_where_it_is_bright(tmp_path, monkeypa
     rims = np.array([line.get_xydata() for line in axes.lines])
     middles = (rims[:, 0] + rims[:, 32]) / 2  # of opposite points
     assert middles[middles[:, 0].argsort()] == pytest.approx(0.5 * known[:, :2], abs=0.1)
-    words, share = axes.get_title().split("; whole circles have ")
+    words, share = axes.get_title().split("; circles, with their parts outside, have ")
     assert words == "3 fibres" and float(share.split()[0]) == pytest.approx(100 * bright.mean(), rel=0.02)
 
 
