@@ -100,7 +100,7 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Compute amplitudes alpha, jumps and residuals for multipliers `lam` (owned rows, k).
+        """Make the solutions for multipliers `lam` (owned rows, k), with amplitudes alpha, jumps and residuals.
 
         `strains` (k, v) are the loads E; `jump` (owned rows, k) is d E - (F + C) lam, without rigid-body motions; the
         residuals are relative to `scale` (k,).  `iterations` and `reason` are stored in the solutions.
@@ -123,7 +123,7 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Return the sum of k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
+        """Sum k solutions with equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
 
         If all solutions have alpha, the sum has alpha, the most iterations, the least reason and a new residual; else
         alpha is None, and the other numbers are from the first solution.
@@ -143,7 +143,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Compute alpha, jumps and residual of a solution in the present state, by F lambda.
+        """Complete a solution of the present state: return it with alpha, jumps and residual by F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """

@@ -19,9 +19,9 @@ from feti_homog.typing import Float, Int
 class NaturalCoarseSpace:
     """The rigid-body motions of all subdomains, and P = I - G (G^T G)^-1 G^T.
 
-    P projects onto multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f vanishes, because the load of a
-    macroscopic strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every
-    kernel mode.  A rank stores its owned rows of G, and a factor of G^T G or a part of it (`DistributedSolver`).
+    P projects onto multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f = 0, because the load f of a macroscopic
+    strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every kernel mode.  A
+    rank stores its owned rows of G, and a factor of G^T G or a part of it (`DistributedSolver`).
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
@@ -29,9 +29,9 @@ class NaturalCoarseSpace:
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m) jumps of the modes.
         body: (m,) body numbers of the modes.
-        pinned_body: body with held nodes or with supporting springs, the last of several; -1 without such a body.
+        pinned_body: last body with held nodes or supporting springs; -1 without such a body.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) numbers of owned modes, and of modes in owned rows of G or in local unconstrained modes.
+        unknowns: (u,) modes that this rank needs: owned ones, and those in owned rows of G or in unconstrained modes.
         factorizations: number of factorizations of G^T G.
         solver: solver for G^T G.
     """
@@ -96,9 +96,9 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return G^T A G, which stores 36 products for a row between two bodies.  Collective when first read.
+        """Set up the matrix G^T A G of changing active rows A.  Collective when first read.
 
-        Modes of the pinned body are left out: its pieces are glued together and cannot move.
+        A row between two bodies takes 36 products.  Modes of the pinned body, whose pieces are glued, are left out.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
@@ -116,7 +116,7 @@ class NaturalCoarseSpace:
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def balancing(self, forces: Float) -> Float:
-        """Compute G (G^T G)^-1 e (owned rows, k): the least-norm lam with G^T lam = e.  Collective.
+        """Compute the least-norm multipliers lam = G (G^T G)^-1 e (owned rows, k) with G^T lam = e.  Collective.
 
         `forces` (owned modes, k) are the rows of e for local subdomains; lam is 0 on inactive rows.
         """
@@ -144,7 +144,7 @@ class GramMatrix:
     """The matrix G^T A G for changing active rows A = diag(a), summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
+        """Store the products of all entry pairs in each row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # For every row, its number of products, and the number of the first; for every product, its entry and value.
@@ -206,7 +206,7 @@ class GramMatrix:
         return Z
 
     def groups(self, modes: Int) -> list[Int]:
-        """Group `modes` that G^T G couples; return an array (groups, size) for every group size."""
+        """Group the numbers `modes` by couplings in G^T G; return an array (groups, size) for every group size."""
         position = np.full(self._m, -1)
         position[modes] = np.arange(len(modes))
         i, j = position[self._rows], position[self._columns]

@@ -76,7 +76,7 @@ class Neighbours:
 
 
 class InterfaceNeighbours:
-    """The n interface nodes of the cell in row order, and their adjacency.
+    """The n interface nodes of the cell in row order, and adjacent nodes.
 
     Attributes:
         rows: (n,) first global row of the bond.
@@ -116,9 +116,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Return global rows (k,) and rows at nodes around, at least `enough` in all, in ascending order.
+        """Extend global `rows` by rows at adjacent nodes, ring by ring, to at least `enough` rows in ascending order.
 
-        `choose` selects new rows from candidates.  With no further adjacent node, the result may have fewer rows.
+        `choose` selects new rows from candidates.  The result has fewer rows if no further node is adjacent.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

@@ -79,7 +79,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow columns to the rows `active` with compliance `more`, like `FollowedResponse.follow`.  Collective."""
+        """Follow columns to rows `active`, added compliance `more`; False at pivots up to `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -199,7 +199,7 @@ class ExactInverse(Preconditioner):
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
-        """Compute Gamma g_A + g_I (owned rows, k): A active in the reference cell, I inactive.  Collective."""
+        """Compute the reference response Gamma g_A + g_I to g (owned rows, k), A active, I inactive.  Collective."""
         inactive = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
@@ -211,7 +211,7 @@ class ExactInverse(Preconditioner):
         """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Unless `free` pins exist, a changed cell is factored anew, and the result is None.
+        possible positions.  If the number of pins is not `free`, returns None, and factors a changed cell anew.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -223,10 +223,10 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute U (owned rows, v) anew from the reference cell's response to `d`; store and return U.  Collective.
+        """Compute the answer U to unit loads (owned rows, v) anew; store and return U.  Collective.
 
-        `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
-        rounding from earlier updates.
+        U has multipliers on active rows and jumps on inactive rows, from the reference cell's response to `d` (owned
+        rows, v), the same in all calls: jumps of the torn cell under unit loads.  Rounding of earlier updates is gone.
         """
         changes = self._up_to_date()
         if self._answer is None:
@@ -240,7 +240,7 @@ class ExactInverse(Preconditioner):
     def inverse_blocks(self, pairs: Int) -> Float:
         """Compute the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
+        All ranks pass equal pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)

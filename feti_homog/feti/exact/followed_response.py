@@ -95,7 +95,7 @@ class FollowedResponse:
         return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
 
     def product(self, rows: Int, x: Float) -> Float:
-        """Compute Gamma_:rows x (owned rows, k) for global rows (c,) with columns, and x (c, k)."""
+        """Compute Gamma[:, rows] x (owned rows, k) for global `rows` (c,) with columns, and x (c, k)."""
         at, n, columns = self._slot[rows], self._count, len(self._rows)
         waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
         return product_with_some(self._buffer[:, :columns], at, x) - waiting
@@ -124,7 +124,7 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, blocks)
 
     def add(self, rows: Int, columns: Float) -> None:
-        """Store the columns (owned rows, k) of global rows (k,), after `make_room`."""
+        """Store the columns (owned rows, k) of global rows (k,); call `make_room` first."""
         self._apply_waiting()
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
@@ -156,7 +156,7 @@ class FollowedResponse:
         return all(self._turn(rows[part], signs[part], gains[part], pivot) for part in parts if len(part))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
+        """Update U and columns for springs on `rows` (k,) that gain compliance `more`; see `follow`.  Collective."""
         self._make_room_for_waiting(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))
