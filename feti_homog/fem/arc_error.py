@@ -1,7 +1,7 @@
 """Estimate the energy error of straight or parabolic element sides that replace circular arcs.
 
 The sides take area from a body or add area to it, and displacements along a side are polynomials between its nodes.
-Every body computes its error without communication; the contributions of two glued bodies cancel on their interface.
+Every body computes its error without communication; for glued bodies the sum depends only on jumps between phases.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Assemble the stiffness and the unit loads of a subdomain; compute element strains and integrals along edges.
 
-Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
+Shears are engineering shears; degrees of freedom follow node by node.  The elements of a coarse triangle are first
 summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
@@ -100,7 +100,7 @@ def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_mat
 
 
 def element_strain(points: Float, triangles: Int32, u: Float, problem: Problem) -> Float:
-    """Compute the mean element strains (e, m) under displacements u (n, c) of the nodes."""
+    """Compute the mean strain (e, m) of every element under nodal displacements u (n, c)."""
     strain = np.empty((len(triangles), problem.strains))
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
         g, w = gradients(points[triangles[part]])
@@ -212,7 +212,7 @@ class MacroElement:
 
 
 def products(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k dN_b/dx_l (e, a, a, 4), (k, l) flat, by gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate gradient products dN_a/dx_k dN_b/dx_l (e, a, a, 4), (k, l) flat; g (e, q, a, 2), weights w (e, q)."""
     e, q, a, _ = g.shape
     flat = g.reshape(e, q, 2 * a)
     outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
@@ -220,12 +220,12 @@ def products(g: Float, w: Float) -> Float:
 
 
 def integrals(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k (e, a, 2) by gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate shape function gradients dN_a/dx_k (e, a, 2), given g (e, q, a, 2) and weights w (e, q)."""
     return np.asarray(np.einsum("eqak,eq->eak", g, w))
 
 
 def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
-    """Compute Q (dofs, m): tractions Sigma n on the cell sides are forces -Q Sigma; (dofs, 0) without tractions."""
+    """Compute loads Q (dofs, m): tractions Sigma n on cell sides are forces -Q Sigma; (dofs, 0) without tractions."""
     if submesh.boundary != "traction":
         return np.zeros((problem.components * mesh.n_classes, 0))
     unit = np.concatenate(np.eye(problem.strains)[problem.voigt], axis=1)

@@ -1,6 +1,6 @@
 """Fit polynomials with p coefficients to element values around every vertex, by least squares weighted with areas.
 
-A boundary vertex has elements on one side only: its fit includes elements around neighbours, and known tractions.
+A boundary vertex has elements on one side only: neighbours' elements and, if linear, known tractions join its fit.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Normalize the `mean` (n, 2) of side normals at vertices; leave out vertices where the normals cancel."""
+        """Set up tractions with normals along the `mean` (n, 2) side normals; leave out vertices where these cancel."""
         length = np.hypot(*mean.T)
         rows = length > NO_NORMAL
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])

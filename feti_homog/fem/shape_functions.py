@@ -32,9 +32,9 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """Return the gradients (q, a, 2) of a shape functions at q points of the reference triangle, and the weights (q,).
+    """Return shape function gradients (q, a, 2) at q points of the reference triangle, and the weights (q,).
 
-    `functions` is a: 3 linear, 6 quadratic, or 7 with the bubble 27 r_0 r_1 r_2 in barycentric coordinates r.
+    The number `functions` is a: 3 linear, 6 quadratic, or 7 with the bubble 27 r_0 r_1 r_2, barycentric coordinates r.
     """
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
@@ -207,7 +207,7 @@ class ElementFields:
         return cls(problem, g, elements.weights, grad_u, strains(grad_u, problem) + loads, rest)
 
     def change(self, A: Float, uniform: Float, moved: Float, changed: Float | None = None) -> Float:
-        """Differentiate the energy products int e_i A e_j (k, k) of loads as nodes move by s V, and u there by s U.
+        """Differentiate int e_i A e_j (k, k), e_i the strains under load i, as nodes move by s V, and u there by s U.
 
         The derivative with respect to s is int (de_i + div V e_i / 2) A e_j plus its transpose, with d grad u = grad U
         - grad V grad u (deLorenzi, Int. J. Fract. 19 (1982) 183).  A is (v, v), `uniform` (v - m, k) the loads after
@@ -236,7 +236,7 @@ def slopes(g: Float, u: Float) -> Float:
 
 
 def strains(slope: Float, problem: Problem) -> Float:
-    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
+    """Return the displacement strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slope.shape[:2], problem.strains, slope.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slope[:, :, d, i]

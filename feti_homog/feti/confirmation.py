@@ -43,7 +43,7 @@ class InfluenceSolutions:
 
         F lambda must solve if the quota is used up, if the jump of a load on the active rows is at most LEAST_FOLLOWED
         times its jump on all rows, or if influence columns and coarse space disagree about the number of free motions.
-        `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
+        `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.  Solutions lack alpha.
         """
         self._prediction = None
         if not self._quota:

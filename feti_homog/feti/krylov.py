@@ -83,12 +83,12 @@ class Stall:
 class PrimalTest:
     """PETSc's convergence test: the primal residuals of force and, with CG or FCG, of jump must fall below rtol.
 
-    The jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual is |P H r| / |P M^-1
-    P d|, relative to the forces that close d.  Here r is the residual.
+    For the residual r, the jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual
+    is |P H r|, relative to the norm of the forces that close d (`Preconditioner.closing_forces`).
 
     Attributes:
         ends_on_stall: whether a stall ends the solve, as a breakdown.
-        jump_scale, force_scale: |P d| and |P M^-1 P d| for the next solve.
+        jump_scale, force_scale: |P d|, and the norm of the forces that close d, for the next solve.
     """
 
     def __init__(self, problem: ProjectedProblem) -> None:

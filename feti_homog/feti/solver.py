@@ -187,7 +187,7 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return loads in columns for the v unit strains E: I (v, v), or (v + m, v) with tractions on the sides.
+        """Return full loads in columns for v unit loads E: I (v, v), or (v + m, v) with tractions on the sides.
 
         Tractions Sigma below I make E the mean strain; raises NotCarriedError if they pull at a free body.  Collective.
         """
@@ -215,7 +215,7 @@ class FetiSolver:
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
-            starts: (owned rows, k) initial multipliers.
+            starts: (owned rows, k) initial multipliers; ignored if `preconditioner.is_exact`.
         """
         k, columns = len(strains), (None if self.is_pulled else self._by_columns)
         if strains.shape[1] == len(self.problem.loads):

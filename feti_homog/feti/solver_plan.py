@@ -44,7 +44,7 @@ class SolverOptions:
 
     Attributes:
         preconditioner: `-feti_pc_type`, one of PRECONDITIONERS.
-        operator: `-feti_dual_operator`, one of KINDS; by default explicit with `-feti_pc_type influence`.
+        operator: `-feti_dual_operator`, one of KINDS; by default explicit with `-feti_pc_type influence`, else auto.
         coarse_space: `-feti_coarse_space`, one of COARSE_SPACES.
         threshold: `-feti_coarse_threshold`, the bound tau of soft modes.
     """

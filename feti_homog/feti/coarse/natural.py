@@ -107,7 +107,7 @@ class NaturalCoarseSpace:
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
-        """Compute (G^T G)^-1 G^T x (m,) or (m, k) for x (owned rows,) or (owned rows, k).  Collective."""
+        """Compute amplitudes (G^T G)^-1 G^T x (m,) or (m, k) of x (owned rows,) or (owned rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
         positions = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
@@ -127,7 +127,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x (owned rows,) or (owned rows, k) that is 0 on inactive rows.  Collective."""
+        """Compute the projection P x of x (owned rows,) or (owned rows, k), 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -184,7 +184,8 @@ class GramMatrix:
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
         """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) are 0.
+        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) count
+        as 0.
         """
         padded, columns = np.append(self.entries(active), 0.0), 0
         rows, numbers, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]

@@ -131,7 +131,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Return METIS parts (n,) of graph nodes: `count` parts of equal `load` (n,), by default connected and equal."""
+    """Return METIS parts (n,) of graph nodes: `count` parts of equal `load` (n,), or connected parts of equal size."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

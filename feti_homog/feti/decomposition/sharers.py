@@ -40,7 +40,7 @@ class Sharers:
 
     @property
     def innermost(self) -> Int:
-        """Return the last sharer (n,) of every entity."""
+        """Return the last sharer (n,) of every entity, in the innermost body."""
         return np.asarray(self.sharer[self.pointer[1:] - 1])
 
     @property

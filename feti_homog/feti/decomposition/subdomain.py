@@ -148,7 +148,7 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L (v, v), with tractions on the sides padded by 0 to (v + m, v + m)."""
+        """Return the stiffness |Omega| L (v, v), padded by 0 to (v + m, v + m) with tractions on the sides."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C

@@ -79,7 +79,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow columns to rows `active`, added compliance `more`; False at pivots up to `pivot`.  Collective."""
+        """Follow columns to a state (`active`, `more` compliance); False at pivots up to `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -171,7 +171,7 @@ class ExactInverse(Preconditioner):
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
         """Select rows without columns: the global `rows` (k,), and active rows nearby up to a full batch.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  If all are inactive, none is added.
+        Neighbours of broken bonds break next, and columns are cheaper together.  Only active `rows` add rows nearby.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
@@ -204,11 +204,11 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
+        """Compute multipliers H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
-        """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
+        """Return multipliers H d E and jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
         possible positions.  If the number of pins is not `free`, returns None, and factors a changed cell anew.

@@ -138,7 +138,7 @@ class FollowedResponse:
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.
-            signs: (k,) s: 1 for rows that become inactive, -1 for rows that become active, 0 for others.
+            signs: (k,) s: 1 for rows that become inactive, -1 for rows that become active, 0 for rows that stay active.
             gains: (k,) gain of spring compliance.
         """
         is_pin = (rows[:, None] == self.pins).any(axis=1)

@@ -248,7 +248,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
 
 
 def stiffness_of_rows(operators: InterfaceOperators) -> Float:
-    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,).  Collective.
+    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,) of every row.  Collective.
 
     D is the diagonal of K, C the compliance of the springs.
     """

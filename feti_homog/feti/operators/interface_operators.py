@@ -194,7 +194,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in inner bodies: at bonds the inner of two, elsewhere not outer."""
+        """Return the mask (n,) of boundary dofs in inner bodies; of two bonded bodies, only the inner one counts."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
