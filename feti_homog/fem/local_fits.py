@@ -1,6 +1,6 @@
 """Fit polynomials with p coefficients to element values around every vertex, by least squares weighted with areas.
 
-A boundary vertex has elements on one side only: neighbours' elements and, if linear, known tractions join its fit.
+A boundary vertex has few elements: its fit includes elements around neighbours, a linear fit known tractions, too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """The n pairs of a boundary vertex and a neighbour, whose elements join the boundary fit with weight NEIGHBOURS.
+    """The n pairs of boundary vertex and neighbour: the fit includes the neighbour's elements with weight NEIGHBOURS.
 
     Attributes:
         at, other: (n,) boundary vertex and neighbour vertex.
@@ -76,7 +76,7 @@ class PatchNeighbours:
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
     """Fit a linear function about every vertex to uniform element values (e, k).
 
-    Returns the fit values (vertices, k) at the vertices, which are weighted means of element values.
+    Returns the fit values (vertices, k) at the vertices: weighted means of element values.
 
     Args:
         vertices: (3, e) vertices of the elements.

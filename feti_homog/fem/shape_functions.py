@@ -85,7 +85,7 @@ def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
 
     With second derivatives H_(a r) of shape functions (`HESSIANS`), K_(a i)(b j) gains H_(a r) H_(b s) X_(r s)(i j).
     For a quadratic u, div u is linear and div sigma = f is constant.  So the force on the bubble b is -int b f, and
-    pressure changes only its stiffness, det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m), m = inverse^T T inverse.
+    pressure changes only b's stiffness, det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m), m = inverse^T T inverse.
 
     Args:
         L: (v, v) stiffness, isotropic in the plane, with Lame constants lambda and mu.

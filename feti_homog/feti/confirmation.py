@@ -69,7 +69,7 @@ class InfluenceSolutions:
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
         """Compute multipliers H d E (owned rows, k) that close the jumps d E, for loads E (v, k).  Collective.
 
-        Column j of E is `weights[j]` times load j of the last call of `solutions`; its prediction, if any, is scaled.
+        Column j of E is `weights[j]` times load j of the last `solutions`; multipliers predicted there are reused.
         """
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 

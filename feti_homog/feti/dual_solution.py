@@ -74,7 +74,7 @@ class ActiveJumps:
     def projected(self, x: Float) -> Float:
         """Compute P x for jumps x (owned rows, k), restricted to the active rows.
 
-        P is applied twice: a single product leaves rounding of rigid-body motions, on which a Krylov method stalls.
+        P is applied twice: a single product leaves rounded rigid-body motions, and Krylov methods stall.
         """
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
@@ -158,7 +158,7 @@ def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
     For `displacement` u = K+ f (boundary dofs, v) and machine precision eps, the estimate is B K+ (eps diag(K) |u|)
-    with random signs: jumps under forces as large as the rounding of K u, which may move soft subdomains far.
+    with random signs: jumps under forces as large as the rounding of K u.  Such forces may move soft subdomains far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

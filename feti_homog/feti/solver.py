@@ -187,9 +187,9 @@ class FetiSolver:
 
     @property
     def closure(self) -> Float:
-        """Return full loads in columns for v unit loads E: I (v, v), or (v + m, v) with tractions on the sides.
+        """Return the v unit loads as columns: I (v, v), or (v + m, v) with tractions Sigma on the sides below I.
 
-        Tractions Sigma below I make E the mean strain; raises NotCarriedError if they pull at a free body.  Collective.
+        Sigma makes unit strains mean strains; raises NotCarriedError if tractions pull at a free body.  Collective.
         """
         v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
         if n > v and not self._units:

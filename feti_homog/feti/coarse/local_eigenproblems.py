@@ -60,7 +60,7 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Build the trace space and the subdomain's part of M^-1; `common` is its item of `Neighbours.common`."""
+        """Build the trace space and the subdomain's part of M^-1; `common` is one item of `Neighbours.common`."""
         self.block, self.common, self._operator, subdomain = block, common, operator, block.subdomain
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
@@ -144,8 +144,8 @@ def eigenproblem(
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
     """Compute the forces f = N p (n, m), N = B^T M B, and project them to R^T f = 0.
 
-    M is M^-1 of the module on the rows of B.  S+ N p is a step of inverse iteration, which turns an eigenvector p
-    (n, m) of the trace space into a displacement of the body itself.  `R` (n, k) is the kernel.  f is as precise as M.
+    M is M^-1 of the module on the rows of B.  S+ N p, a step of inverse iteration, turns an eigenvector p (n, m) of the
+    trace space into a displacement of the body itself.  `R` (n, k) is the kernel.  f is as precise as M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
     inverse = np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True)

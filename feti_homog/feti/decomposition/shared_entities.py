@@ -174,8 +174,8 @@ class SharedEntities(Sharers):
         body: (sharers,) body of every sharer.
         fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
         pair: (n,) number of the interface in the case; -1 where no bond can break.
-        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for
-            s in [0, 1]; at a vertex, two equal normals of its tributary length.
+        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for s
+            in [0, 1]; at a vertex, two equal normals as long as the vertex's tributary length.
         turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: half-open range of the vector constraints that this rank owns.

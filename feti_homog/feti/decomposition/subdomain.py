@@ -193,8 +193,8 @@ class Subdomain:
         """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K that scales jumps.
 
         lambda and mu are the Lame constants of L.  Single nodes of mixed elements are as stiff as lambda, boundary
-        motions at constant volume only as mu.  The factor is 1 without mixed elements, and for several materials, which
-        are all far from incompressible.
+        motions at constant volume only as mu.  The factor is 1 without mixed elements, and for several materials, of
+        which none is nearly incompressible.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0

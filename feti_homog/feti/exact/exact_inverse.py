@@ -34,7 +34,7 @@ class ExactInverse(Preconditioner):
         norm: upper bound of |H|.
         factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns above which unused columns are dropped; applies from the next reference cell.
+        most_followed: number of columns above which unused columns are dropped, set for the next reference cell.
     """
 
     is_exact = True
@@ -94,7 +94,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _restart(self) -> None:
-        """Factor the cell in its present state, and follow columns from the new response.  Collective."""
+        """Factor the cell with tied bodies and initial springs; follow columns to the present state.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         self._followed = FollowedResponse(self.comm, self._first, self.stiffness, self._no_answer, self.most_followed)

@@ -14,9 +14,9 @@ with the other entries as above.  Springs of inactive rows have the initial comp
 a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs only the columns of
 I; changes of the other stored columns are collected, and applied when there are WAITING_COLUMNS of them.
 
-If a row becomes inactive that alone resists a motion of a body, the row becomes a pin.  A pin stays among the active
-rows, with multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists
-the motion becomes active.
+A row that alone resists a motion of a body becomes a pin, not inactive.  A pin stays among the active rows, with
+multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists the motion
+becomes active.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int
 
 
 class ReferenceChanges:
-    """The changed rows C of a reference cell, which must have followed columns.
+    """The changed rows C of a reference cell; all of C must have followed columns.
 
     Attributes:
         rows: (c,) global numbers of C.

@@ -103,7 +103,7 @@ class CondensedMatrix:
         S: (n, n) Schur complement K_bb - K_bi K_ii^-1 K_ib, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
-        factor: factor of K + D by CHOLMOD; None if it is not kept, or if MUMPS condensed K.
+        factor: CHOLMOD's factor of K, shifted; None if it is not kept, or if MUMPS condensed K.
     """
 
     S: Float

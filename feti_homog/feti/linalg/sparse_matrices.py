@@ -167,7 +167,7 @@ class DistributedSolver:
 
         Raises:
             LinAlgError: A is not positive definite on a rank (rounding may differ between processors); all ranks raise.
-            MemoryError, CaseError: as in `factored`.
+            MemoryError, CaseError, FetiHomogError: as in `factored`.
         """
         self.destroy()
         error = None

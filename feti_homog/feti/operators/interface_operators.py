@@ -123,7 +123,7 @@ class InterfaceOperators:
             the springs of the body.
         interiors: factored interiors by position of the subdomain, kept by `extend`.
         springs: (owned rows,) compliance of the springs.
-        compliance: (owned rows,) compliance of springs between two cut bodies, which belong to no subdomain; else 0.
+        compliance: (owned rows,) compliance of the springs of no subdomain, between two cut bodies; else 0.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """The boundary operators of one subdomain: Schur complement S and flexibility S+, dense or by sparse factors.
 
-S and S+ are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
+Dense S and S+ are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  One partial
 factorization gives S.  As the dual problem lives on the boundary, the factor is kept only for displacements inside.
 Sparse factors replace dense matrices that would be too large.
 """
