@@ -1,7 +1,7 @@
 """Assemble the stiffness and the unit loads of a subdomain; compute element strains and integrals along edges.
 
-Shears are engineering shears; degrees of freedom follow node by node.  The elements of a coarse triangle are first
-summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
+Shears are engineering shears; degrees of freedom are numbered node by node.  The elements of a coarse triangle are
+first summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class DualSolution:
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
         iterations, reason: iterations of the Krylov method, and PETSc's KSPConvergedReason.
         residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell there; without alpha, the
-            residual of the last solution with alpha.
+            largest residual of the last solutions with alpha.
         compliance: (owned rows,) compliance C of the springs, length per nodal force.
     """
 
@@ -74,15 +74,15 @@ class ActiveJumps:
     def projected(self, x: Float) -> Float:
         """Compute P x for jumps x (owned rows, k), restricted to the active rows.
 
-        P is applied twice: a single product leaves rounded rigid-body motions, and Krylov methods stall.
+        P is applied twice: rounding of a single product contains rigid-body motions, which stall a Krylov method.
         """
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, active: Float, torn: Float) -> Float:
         """Bound the rounding (k,) in jumps of the torn cell on active rows, under loads (v, k).
 
-        The bound is ZERO_JUMP times `torn`.  If an `active` norm lies between this bound and the square root of the
-        machine precision times `torn`, all bounds are at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
+        The bound is ZERO_JUMP times `torn`.  If an `active` norm lies between this bound and sqrt(eps) times `torn`,
+        with the machine precision eps, all bounds are at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
 
         Args:
             displacement: (boundary dofs, v) displacements of the torn cell under unit loads, the same at every call.

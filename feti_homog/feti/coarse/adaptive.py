@@ -113,12 +113,13 @@ class AdaptiveCoarseSpace:
         """Factor the coarse matrix Z_0^T S Z_0 of all ranks.  Collective.
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
-        have no energy and get no equation; other modes may be linearly dependent.  Adding eps I makes the matrix
-        definite; S_0 then keeps the fraction eps / (mu + eps) of the forces S z of a mode z with scaled energy mu.
+        have no energy and get no equation; other modes may be linearly dependent.  Adding eps I, eps in
+        COARSE_REGULARISATIONS, makes the matrix definite; S_0 then keeps the fraction eps / (mu + eps) of the forces of
+        a mode with scaled energy mu.
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
-            MemoryError, CaseError: as in `DistributedSolver.factor`.
+            MemoryError, CaseError, FetiHomogError: as in `DistributedSolver.factor`.
         """
         self.factorizations += 1
         if not self.coarse_dimension:

@@ -158,7 +158,7 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute N (m + k, m + k) for `soft_modes`: [P R]^T B^T M B [P R], P (n, m), R (n, k), M as in `jump_forces`."""
+    """Compute energy products [P R]^T B^T M B [P R] (m + k, m + k); P (n, m), R (n, k), M as in `jump_forces`."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)

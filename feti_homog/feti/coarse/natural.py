@@ -184,8 +184,7 @@ class GramMatrix:
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
         """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) count
-        as 0.
+        `active` (owned rows,) is a.  Among coupled modes, eigenvalues up to the largest `tolerance` (m,) count as 0.
         """
         padded, columns = np.append(self.entries(active), 0.0), 0
         rows, numbers, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]

@@ -177,7 +177,7 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """Count the node copies in the outer and the inner body that every row connects.
+        """Count the node copies in the outer and the inner body at every row that connects two bodies.
 
         Returns:
             (local rows, 2) copies in the outer and the inner body, and (local rows,) number of the inner body; rows

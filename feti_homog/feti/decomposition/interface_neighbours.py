@@ -79,14 +79,14 @@ class InterfaceNeighbours:
     """The n interface nodes of the cell in row order, and adjacent nodes.
 
     Attributes:
-        rows: (n,) first global row of the bond.
+        rows: (n,) first global row of the bond at every node.
         first: number of the first node on this rank; 0 on a rank without nodes.
         adjacency: (n, n) matrix with 1 between adjacent nodes.
         near: (n, most neighbours + 1) every node and its neighbours, padded with the node.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Find adjacent nodes along interfaces; rows of a rank ascend.  Collective."""
+        """Find adjacent nodes along interfaces; the rows of every rank must ascend.  Collective."""
         rows = jump_operator.owned[0] + jump_operator.nodes.row
         self.comm = comm
         self.rows: Int = np.concatenate(comm.allgather(rows))

@@ -256,7 +256,7 @@ class Subdomain:
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute an orthonormal kernel (cn, k) at n positions: translations, a turn if `rotates`; `held` nodes rest."""
+    """Compute an orthonormal kernel (cn, k): translations, and a turn if `rotates`, with `held` nodes at rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:

@@ -79,7 +79,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow columns to a state (`active`, `more` compliance); False at pivots up to `pivot`.  Collective."""
+        """Follow columns to the state `active`, `more`; return False if a pivot is at most `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)

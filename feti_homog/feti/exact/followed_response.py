@@ -64,7 +64,7 @@ class FollowedResponse:
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
         """Make room for `more` columns: if necessary, drop the least recently used columns.
 
-        Columns of the rows `needed` stay, even above the capacity; columns of `useful` rows (all rows,) go last.
+        Columns of rows `needed` stay, even above the capacity; rows in the mask `useful` (all rows,) lose columns last.
         """
         capacity = len(self._used)
         if len(self._rows) + more <= capacity:

@@ -189,7 +189,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute max |Gamma r| / `stiffness` (owned rows,) for jumps r of unit rigid-body motions.  Collective."""
+        """Measure rounding: max |Gamma r| / `stiffness` (owned rows,), jumps r of rigid-body motions.  Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         units = (motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)
@@ -224,7 +224,7 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs) with B B_D^T = I, whose transpose moves one body per bond.  Collective.
+    """Build B_D (local rows, boundary dofs), B B_D^T = I; B_D^T moves one body at every bond.  Collective.
 
     Then columns of Gamma need only forces of the moved bodies.  The inner body moves, unless its forces would lose
     digits because it is more than STIFF_FIBRES times as stiff as the outer body.

@@ -89,7 +89,7 @@ class PartialFactor:
     """
 
     def __init__(self, A: csr_matrix, rows: Int, order: Int) -> None:
-        """Factor A (n, n); `rows` (m,) come last, the other rows follow `order` (n,).
+        """Factor A (n, n), and sort its indices in place; `rows` (m,) come last, other rows follow `order` (n,).
 
         Raises:
             LinAlgError: A is not positive definite.

@@ -89,7 +89,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix of a `diagonal` (n,) and the upper (`lower` 0) or lower (1) triangle.
+        """Multiply x by the symmetric matrix of `diagonal` (n,) and the stored upper (`lower` 0) or lower (1) triangle.
 
         The product goes into `out` if given, and is fastest for x in Fortran order.
         """

@@ -169,7 +169,7 @@ def _factored(block: Float) -> tuple[Float, bool]:
 
 
 class SpringUpdated(Preconditioner):
-    """A preconditioner H with `SpringUpdate` for the springs of active rows, which may soften."""
+    """A preconditioner H with `SpringUpdate` for the springs of active rows; the springs may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
         """Update H = `inner` with all rows active; arguments and exceptions are as in `SpringUpdate`.  Collective."""
