@@ -154,7 +154,7 @@ class GroupedSum:
     """A rule that sums groups of element entries in every coarse triangle.
 
     Attributes:
-        entries: all entry numbers, flat, group after group.
+        entries: flat numbers of the entries in a coarse triangle, sorted by group.
         first: position in `entries` at which every group starts.
     """
 

@@ -112,8 +112,7 @@ class InfluenceSolutions:
 
         Errors of a load are relative to the largest entry in `lam`, or in `opening`, both (owned rows, k).  Jumps count
         only without free bodies.  Multipliers may cancel, as in pressed bonds, so their scale is at least
-        LEAST_FOLLOWED times the sum of multipliers under single strains.  `residuals` (k,) are relative errors in
-        `lam`.
+        LEAST_FOLLOWED times the sum of magnitudes under single strains.  `residuals` (k,) are relative errors in `lam`.
         """
         assert self._prediction is not None
         predicted, jumps, terms = self._prediction

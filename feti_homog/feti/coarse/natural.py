@@ -98,7 +98,8 @@ class NaturalCoarseSpace:
     def _gram(self) -> GramMatrix:
         """Set up the matrix G^T A G of changing active rows A.  Collective when first read.
 
-        A row between two bodies takes 36 products.  Modes of the pinned body, whose pieces are glued, are left out.
+        In the plane, a row between whole bodies takes 36 products.  Modes of the pinned body are left out: its pieces
+        are glued together and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 

@@ -1,9 +1,9 @@
 """The jump operator B on one rank, the layout of the multipliers, interface springs, and node blocks.
 
-A fine node has k copies in the subdomains.  Copies within one body are glued in x and y by orthonormal contrasts, and
-can never part.  An inner body, such as a fibre, and the body around it are glued by two rows, along the normal n and
-the tangent, between the means of their copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is
-the gap, and a normal multiplier is the nodal force between the faces, positive in tension.
+A fine node has k copies in the subdomains.  Copies within one body are glued in all components by orthonormal
+contrasts, and can never part.  An inner body, such as a fibre, and the body around it are glued between the means of
+their copies, in the plane by two rows along the normal n and the tangent; this bond can break.  So B has full row rank,
+n.(u_outer - u_inner) is the gap, and a normal multiplier is the nodal force between the faces, positive in tension.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ class DualOperator:
     F is symmetric positive definite: B has full row rank, and K+ is definite.
 
     Attributes:
-        compliance: (owned rows,) diagonal of C.
+        compliance: (owned rows,) compliance of the springs, the diagonal of C.
     """
 
     def __init__(self, boundary: InterfaceOperators, compliance: Float) -> None:
