@@ -1,4 +1,4 @@
-"""Plane elasticity, axial shear and conduction on linear and isoparametric quadratic triangles, vectorized.
+"""Finite elements for plane elasticity, axial shear and conduction: linear and isoparametric quadratic triangles.
 
 Imports `mesh`.  Main entry: `assembly.assemble`, the stiffness matrix and load columns of one subdomain.
 """

@@ -1,7 +1,7 @@
 """Estimate the energy error of straight or parabolic element sides that replace circular arcs.
 
 The sides take area from a body or add area to it, and displacements along a side are polynomials between its nodes.
-Every body computes its error without communication; the contributions of two glued bodies cancel on their interface.
+Every body computes its error without communication; for glued bodies the sum depends only on jumps between phases.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find the element sides along the arcs of `body`, which joins `submeshes` that `lattice` refines."""
+        """Find the element sides on the arcs of `body`, which consists of `submeshes` refined by `lattice`."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # On side k, from vertex k to the next vertex, the barycentric coordinate of the third vertex is zero.
@@ -74,7 +74,7 @@ class ArcSides:
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides, weights: Float) -> Float:
-    """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, from sides that replace arcs.
+    """Estimate the error (k, k) in int sigma_i : eps_j, for loads i and j, due to sides that replace arcs.
 
     Diagonal entries are twice the energy error; each side has a weight (f,).  With recovered stresses sigma, the
     estimate is
@@ -82,7 +82,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides, weights: Float) -> Float:
         -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
 
     where V is the outward distance from the side to the arc, and t = sigma n.  The first integral is the energy rate of
-    a moving boundary.  D is the difference of order p between the nodes on a side of length h, and c = 1/12 or, in
+    a moving boundary.  D is the difference of order p along the nodes of a side with length h, and c = 1/12 or, in
     order 2, 1/60: t does work on the interpolation error, -h^2 / 12 int t' . u' ds or -h^4 / 960 int t'' . u'' ds.
     """
     if not len(sides.element):

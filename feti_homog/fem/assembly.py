@@ -1,7 +1,7 @@
 """Assemble the stiffness and the unit loads of a subdomain; compute element strains and integrals along edges.
 
-Shears are engineering shears, and degrees of freedom are node-major.  The elements of a coarse triangle are first
-summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
+Shears are engineering shears; degrees of freedom are numbered node by node.  The elements of a coarse triangle are
+first summed into one `MacroElement`; all affine coarse triangles have the same reference integrals.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ def assemble(
 
 @lru_cache(maxsize=16)  # pieces of a label image have few different classes
 def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_matrix, Int32, Int]:
-    """Find the pattern of K: sums (blocks, t p) of couples to blocks, the block columns, and each row's first block.
+    """Find the pattern of K, (n, n) blocks, from the bytes `classes` of the node classes (t, q) of t coarse triangles.
 
-    `classes` holds the bytes of the node classes (t, q) of all coarse triangles; K has (n, n) blocks.
+    Returns a matrix (blocks, t p) that sums couples to blocks, the column of every block, and each row's first block.
     """
     of_triangle, macro = np.frombuffer(classes, np.int32).reshape(-1, len(lattice.nodes)), MacroElement.of(lattice)
     rows, columns = of_triangle[:, macro.rows], of_triangle[:, macro.columns]
@@ -100,7 +100,7 @@ def _pattern(classes: bytes, n: int, lattice: ReferenceLattice) -> tuple[csr_mat
 
 
 def element_strain(points: Float, triangles: Int32, u: Float, problem: Problem) -> Float:
-    """Compute the mean element strains (e, m) under displacements u (n, c) of the nodes."""
+    """Compute the mean strain (e, m) of every element under nodal displacements u (n, c)."""
     strain = np.empty((len(triangles), problem.strains))
     for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
         g, w = gradients(points[triangles[part]])
@@ -118,7 +118,7 @@ def _chunks(numbers: Int, size: int) -> list[Int]:
 def _affine(
     macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
 ) -> tuple[Float, Float, float]:
-    """Integrate the affine coarse triangles `part` (t,) on the unit triangle.
+    """Compute stiffness blocks and gradient integrals of the affine coarse triangles `part` (t,).
 
     `tensor` (4, c^2) turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j); `mixed` is the stiffness of mixed elements, or
     None.  Returns stiffness blocks (t, p, c^2) of the node couples, gradient integrals (t, q, 2) and the total area.
@@ -154,7 +154,7 @@ class GroupedSum:
     """A rule that sums groups of element entries in every coarse triangle.
 
     Attributes:
-        entries: all entry numbers, flat, group after group.
+        entries: flat numbers of the entries in a coarse triangle, sorted by group.
         first: position in `entries` at which every group starts.
     """
 
@@ -212,7 +212,7 @@ class MacroElement:
 
 
 def products(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k dN_b/dx_l (e, a, a, 4), (k, l) flat, by gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate gradient products dN_a/dx_k dN_b/dx_l (e, a, a, 4), (k, l) flat; g (e, q, a, 2), weights w (e, q)."""
     e, q, a, _ = g.shape
     flat = g.reshape(e, q, 2 * a)
     outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
@@ -220,12 +220,12 @@ def products(g: Float, w: Float) -> Float:
 
 
 def integrals(g: Float, w: Float) -> Float:
-    """Integrate dN_a/dx_k (e, a, 2) by gradients (e, q, a, 2) and weights (e, q)."""
+    """Integrate shape function gradients dN_a/dx_k (e, a, 2), given g (e, q, a, 2) and weights w (e, q)."""
     return np.asarray(np.einsum("eqak,eq->eak", g, w))
 
 
 def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
-    """Compute Q (dofs, m): tractions Sigma n on the cell sides have the load -Q Sigma; (dofs, 0) without tractions."""
+    """Compute loads Q (dofs, m): tractions Sigma n on cell sides are forces -Q Sigma; (dofs, 0) without tractions."""
     if submesh.boundary != "traction":
         return np.zeros((problem.components * mesh.n_classes, 0))
     unit = np.concatenate(np.eye(problem.strains)[problem.voigt], axis=1)
@@ -233,9 +233,9 @@ def side_loads(submesh: Submesh, mesh: FineMesh, problem: Problem) -> Float:
 
 
 def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
-    """Integrate N n (classes, 2) along the torus edges in the mask `edges` (torus edges,), with n into the body.
+    """Integrate int N n ds (classes, 2) of shape functions N along the torus edges in a mask `edges` (torus edges,).
 
-    Around a void, u^T int N n ds = int grad u, integrated over the void.
+    The normal n points into the body.  So around a void, u^T int N n ds is the integral of grad u over the void.
     """
     sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, edges)
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
@@ -250,7 +250,7 @@ def boundary_integrals(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Float:
 
 
 def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
-    """Return the nodes (sides, intervals + 1) along the torus edges in a mask; the body is on the left."""
+    """Return the plane nodes (sides, intervals + 1) along torus edges in a mask; the body is on their left."""
     triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
     lattice, sides = mesh.lattice.nodes, []
     for k in range(3):  # from vertex k to vertex k + 1

@@ -1,6 +1,6 @@
-"""Fit polynomials to the element values around every vertex, by least squares weighted with areas.
+"""Fit polynomials with p coefficients to element values around every vertex, by least squares weighted with areas.
 
-A fit has p coefficients.  A boundary vertex has elements on one side only, so known tractions correct its fit.
+A boundary vertex has few elements: its fit includes elements around neighbours, a linear fit known tractions, too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """The n pairs of a boundary vertex, with few elements, and a neighbour; the neighbour has the weight NEIGHBOURS.
+    """The n pairs of boundary vertex and neighbour: the fit includes the neighbour's elements with weight NEIGHBOURS.
 
     Attributes:
         at, other: (n,) boundary vertex and neighbour vertex.
@@ -54,12 +54,12 @@ class PatchNeighbours:
         return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
     def shared(self, sums: Float, order: int) -> Float:
-        """Return the weighted neighbour contributions (vertices, p, k) to the sums (vertices, p, k)."""
+        """Compute the neighbours' weighted parts (vertices, p, k) of right-hand sides `sums` (vertices, p, k)."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """Return the weighted neighbour contributions (6, vertices) to `moments` of 1, x, y, x^2, x y and y^2."""
+        """Compute the neighbours' weighted parts (6, vertices) of `moments`, the sums of 1, x, y, x^2, x y and y^2."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -67,7 +67,7 @@ class PatchNeighbours:
         return NEIGHBOURS[1] * np.array([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def shared_matrices(self, moments: Float, order: int) -> Float:
-        """Return the weighted neighbour contributions (vertices, p, p) to moments (vertices, p, p)."""
+        """Compute the neighbours' weighted parts (vertices, p, p) of fit matrices `moments` (vertices, p, p)."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
@@ -76,7 +76,7 @@ class PatchNeighbours:
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
     """Fit a linear function about every vertex to uniform element values (e, k).
 
-    Returns the fit values (vertices, k) at the vertices, which are weighted means of element values.
+    Returns the fit values (vertices, k) at the vertices: weighted means of element values.
 
     Args:
         vertices: (3, e) vertices of the elements.
@@ -136,7 +136,7 @@ def gathered(place: Int, values: Float, size: int) -> Float:
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """Solve moments (n, p, p) a = sums (n, p, k) for coefficients a (n, p, k); RIDGE keeps slope moments regular."""
+    """Solve the normal equations `moments` (n, p, p) a = `sums` (n, p, k); RIDGE helps if points lie on a line."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.diag(np.arange(moments.shape[1]) > 0)
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))
@@ -158,17 +158,17 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Normalize the `mean` (n, 2) of side normals at vertices; leave out vertices where the normals cancel."""
+        """Set up tractions with normals along the `mean` (n, 2) side normals; leave out vertices where these cancel."""
         length = np.hypot(*mean.T)
         rows = length > NO_NORMAL
         return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
-        """Copy `stress` (vertices, m, k), and match the known tractions at the vertices `vertex` (n,).
+        """Return a copy of `stress` (vertices, m, k) with the known tractions at the vertices `vertex` (n,).
 
         With d = traction - sigma n and tangent t, the result in the plane is sigma + d n + n d - (d . n) n n + a t t,
-        where a keeps the strain along the boundary, which both sides share; in axial shear it is sigma + d n.
-        `voigt` (c, 2) holds strain numbers as in `Problem`, and the flexibility is (m, m).
+        where a keeps the strain along the boundary, equal on both sides; in axial shear it is sigma + d n.  `voigt`
+        (c, 2) holds strain numbers as in `Problem`, and the flexibility is (m, m).
         """
         n, before = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)

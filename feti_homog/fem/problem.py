@@ -1,7 +1,7 @@
-"""Define the unknowns on the plane mesh: displacements, displacement strains and unit loads.
+"""Define the problems on the plane mesh: displacements, their strains, and the unit loads.
 
-With long fibres, strains do not vary along x3, and the plane x3 = 0 is a plane of symmetry of every phase.  Then the
-displacements in the plane and along x3 have separate problems: generalized plane strain and axial shear.
+With long fibres, strains do not vary along x3, and the plane x3 = 0 is a plane of symmetry of every phase.  So the
+displacements in the plane (generalized plane strain) and the displacement along x3 (axial shear) are independent.
 """
 
 from dataclasses import dataclass, replace
@@ -14,12 +14,12 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem with c displacements u_i on the plane, m displacement strains and v unit loads.
+    """A problem with c displacements u_i on the plane, their m strains (displacement strains), and v unit loads.
 
     Attributes:
         strain: c rows of two numbers; du_i/dx_k is part of the strain number `strain[i][k]`.
-        turns: whether a rigid body can turn without strain.
-        loads: names of the v unit loads, with the m strains first; other loads are uniform in the cell.
+        turns: whether a body can rotate in the plane without strain.
+        loads: names of the v unit loads: first the m displacement strains, then loads that are uniform in the cell.
     """
 
     strain: tuple[tuple[int, int], ...]
@@ -38,7 +38,7 @@ class Problem:
 
     @property
     def stresses(self) -> int:
-        """Return the number of loads that do work on stresses: all but the temperature."""
+        """Return the number of loads with a conjugate stress or heat flux: all but the temperature change."""
         return sum(load != "temperature" for load in self.loads)
 
     @cached_property
@@ -47,12 +47,12 @@ class Problem:
         return np.array(self.strain)
 
     def gradient(self, strain: Float) -> Float:
-        """Return the displacement gradient H (c, 2) without rotation that has the strains (m,)."""
+        """Return the displacement gradient H (c, 2) for displacement strains `strain` (m,), without rotation."""
         count = np.bincount(self.voigt.ravel())
         return np.asarray(strain[self.voigt] / count[self.voigt])
 
     def dofs(self, nodes: Int) -> Int:
-        """Return the degrees of freedom (cn,) at nodes (n,)."""
+        """Return the degrees of freedom (cn,) at nodes (n,), node by node."""
         return np.asarray((self.components * nodes[:, None] + np.arange(self.components)).ravel())
 
     def nodes(self, dofs: Int) -> Int:
@@ -61,13 +61,13 @@ class Problem:
 
 
 PLANE = Problem(((0, 2), (2, 1)), turns=True, loads=("E11", "E22", "gamma12"))
-"""Plane strain and plane stress."""
+"""Plane strain or plane stress: the displacements in the plane."""
 
 GENERALIZED = replace(PLANE, loads=(*PLANE.loads, "E33", "temperature"))
-"""Generalized plane strain: plane displacements, under a uniform strain along x3 and a temperature change as well."""
+"""Generalized plane strain: as PLANE, with a uniform strain along x3 and a temperature change as further loads."""
 
 AXIAL = Problem(((0, 1),), turns=False, loads=("gamma13", "gamma23"))
 """Axial shear: the displacement along x3."""
 
 CONDUCTION = replace(AXIAL, loads=("dT/dx1", "dT/dx2", "dT/dx3"))
-"""Conduction: the temperature, under a uniform gradient along x3 as well."""
+"""Conduction: the temperature in place of a displacement, with a uniform temperature gradient along x3 as a load."""

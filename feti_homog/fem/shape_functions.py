@@ -1,10 +1,10 @@
-"""Evaluate shape functions of linear and quadratic triangles, their gradients at quadrature points, and mixed elements.
+"""Evaluate shape functions of linear, quadratic and mixed triangles, and their gradients at quadrature points.
 
 Mixed elements are quadratic triangles with a cubic bubble and a discontinuous linear pressure (Crouzeix and Raviart
-1973).  The pressure is p = lambda Pi div u, where Pi projects on linear functions in reference coordinates.  Pressure
-and bubble are eliminated element by element, so that the element has the nodes of a quadratic triangle.  It does not
-lock if lambda far exceeds the shear modulus mu.  Mean strains, mean stresses and loads under uniform strains equal the
-values of the quadratic triangle, because the bubble vanishes on the boundary and Pi keeps means.
+1973).  The pressure is p = lambda Pi div u, with the Lame constant lambda and the projection Pi on linear functions in
+reference coordinates.  Pressure and bubble are eliminated element by element, so that the element has the nodes of a
+quadratic triangle.  It does not lock if lambda far exceeds the shear modulus mu.  Mean strains, mean stresses and loads
+under uniform strains equal the values of the quadratic triangle: the bubble is 0 on the boundary, and Pi keeps means.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ T = np.array([[2.0, 1.0], [1.0, 2.0]])
 
 @cache
 def quadrature(functions: int) -> tuple[Float, Float]:
-    """Return the reference gradients (q, a, 2) of the shape functions, and the quadrature weights (q,).
+    """Return shape function gradients (q, a, 2) at q points of the reference triangle, and the weights (q,).
 
-    The functions are 3 linear, 6 quadratic, or 7: the quadratic functions and the bubble 27 r_0 r_1 r_2, barycentric r.
+    The number `functions` is a: 3 linear, 6 quadratic, or 7 with the bubble 27 r_0 r_1 r_2, barycentric coordinates r.
     """
     if functions == 3:
         return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
@@ -46,9 +46,9 @@ def quadrature(functions: int) -> tuple[Float, Float]:
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
-    """Compute the physical shape function gradients (e, q, a, 2) in elements with nodes (e, a, 2).
+    """Compute shape function gradients dN_a / dx_k (e, q, a, 2) in elements with node positions `corners` (e, n, 2).
 
-    The second result is the quadrature weights times the Jacobian determinant (e, q).  `with_bubble` adds the bubble.
+    The second result (e, q) is weight times Jacobian determinant.  Here a = n, or 7 if `with_bubble` adds the bubble.
     """
     nodes = corners.shape[1]
     reference, weights = quadrature(nodes + 1 if with_bubble else nodes)
@@ -76,19 +76,19 @@ def shape_functions(nodes: int, lam: Float) -> Float:
 
 
 def lame(L: Float) -> tuple[float, float]:
-    """Return lambda and mu of a stiffness (v, v) that is isotropic in the plane."""
+    """Return the Lame constants lambda and mu of a stiffness (v, v) that is isotropic in the plane."""
     return float(L[0, 1]), float(L[2, 2])
 
 
 def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
-    """Compute the bubble contribution X (t, 9, 4) to the affine element stiffness.
+    """Compute coefficients X (t, 9, 4) by which eliminated bubbles change the stiffness of affine elements.
 
-    It adds H_a,r H_b,s X_(r s)(i j) to K_(a i)(b j) for the `HESSIANS` H.  The stress of a quadratic u has a constant
-    divergence f on an affine element, and div u is linear.  So the bubble force is -int b f, and pressure changes only
-    the bubble stiffness:  K_bb = det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m),  m = inverse^T T inverse.
+    With second derivatives H_(a r) of shape functions (`HESSIANS`), K_(a i)(b j) gains H_(a r) H_(b s) X_(r s)(i j).
+    For a quadratic u, div u is linear and div sigma = f is constant.  So the force on the bubble b is -int b f, and
+    pressure changes only b's stiffness, det GRADIENTS (mu tr m I + (mu + PROJECTED lambda) m), m = inverse^T T inverse.
 
     Args:
-        L: (v, v) stiffness, isotropic in the plane.
+        L: (v, v) stiffness, isotropic in the plane, with Lame constants lambda and mu.
         inverse, determinant: dr_r / dx_k (t, 2, 2) and det dx/dr (t,).
     """
     first, shear = lame(L)
@@ -130,31 +130,31 @@ class MixedElements:
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
-        """Compute the nodal stiffness (e, 6, 6, 4), with (i, j) flat; bubble and pressure are eliminated."""
+        """Compute the stiffness (e, 6, 6, 4) of node pairs, (i, j) flat, with bubble and pressure eliminated."""
         K, n = self._stiffness(slice(None)), 2 * BUBBLE
         nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """Append the bubble displacement to nodal displacements (e, 6, 2, k), and return all (e, 7, 2, k)."""
+        """Append the bubble displacements in equilibrium to nodal displacements (e, 6, 2, k); return (e, 7, 2, k)."""
         K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
 
     def dilatation(self, u: Float) -> Float:
-        """Compute Pi div u = p / lambda, (e, q, k), under displacements (e, 7, 2, k)."""
+        """Compute the projected dilatation Pi div u = p / lambda (e, q, k) of displacements (e, 7, 2, k)."""
         e, q, a, _ = self.gradients.shape
         return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
 
     def stress(self, u: Float) -> Float:
-        """Compute stresses 2 mu eps + p I, (e, q, 3, k), under displacements (e, 7, 2, k)."""
+        """Compute the stresses 2 mu eps + p I (e, q, 3, k), eps the strain, of displacements (e, 7, 2, k)."""
         first, shear = self.lame
         stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * strains(slopes(self.gradients, u), PLANE)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
         return np.asarray(stress)
 
     def _stiffness(self, functions: slice) -> Float:
-        """Compute the stiffness rows (e, 2n, 14) of n shape functions; the last two columns belong to the bubble:
+        """Compute the stiffness rows (e, 2n, 14) of n shape functions; the last two columns belong to the bubble.
 
         K_(a i)(b j) = int mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
         """
@@ -173,16 +173,16 @@ class MixedElements:
 
 @dataclass(frozen=True)
 class ElementFields:
-    """The fields in e elements at q points under k loads.
+    """The displacement gradients and strains in e elements at q points under k loads.
 
-    In mixed elements the energy is also stationary in the bubble.  With the pressure lambda Pi div u, see
-    `MixedElements`, the energy density is the strain energy density less lambda r^2 / 2, r = div u - Pi div u.
+    Mixed elements have the strain energy density less lambda r^2 / 2, r = div u - Pi div u (`MixedElements`); the
+    energy is stationary with respect to the bubble displacement, too.
 
     Attributes:
         problem: the c displacements, and their m strains.
-        gradients, weights: (e, q, a, 2) for the nodes' shape functions, and (e, q).
+        gradients, weights: gradients (e, q, a, 2) of the nodes' shape functions, and quadrature weights (e, q).
         slopes: (e, q, 2, c, k) du_i / dx_d.
-        strain: (e, q, m, k) with the loads.
+        strain: (e, q, m, k) displacement strains, with the strains of the loads.
         rest: (e, q, k) r; None unless the elements are mixed.
     """
 
@@ -195,7 +195,7 @@ class ElementFields:
 
     @classmethod
     def of(cls, problem: Problem, points: Float, u: Float, A: Float, loads: Float, is_mixed: bool) -> ElementFields:
-        """Compute the fields from nodes (e, a, 2), u (e, a, c, k), stiffness A, and strains `loads` (m, k) to add."""
+        """Compute the fields from nodes (e, a, 2), u (e, a, c, k), stiffness A and strains `loads` (m, k) to add."""
         if not is_mixed:
             g, w = gradients(points)
             grad_u = slopes(g, u)
@@ -207,11 +207,11 @@ class ElementFields:
         return cls(problem, g, elements.weights, grad_u, strains(grad_u, problem) + loads, rest)
 
     def change(self, A: Float, uniform: Float, moved: Float, changed: Float | None = None) -> Float:
-        """Differentiate int e_i A e_j (k, k) with respect to s while nodes move by s V, and u at the nodes by s U.
+        """Differentiate int e_i A e_j (k, k), e_i the strains under load i, as nodes move by s V, and u there by s U.
 
-        The derivative is int (de_i + div V e_i / 2) A e_j plus its transpose, with d grad u = grad U - grad V grad u,
-        exact for the discrete elements (deLorenzi, Int. J. Fract. 19 (1982) 183).  A is (v, v), `uniform` (v - m, k)
-        has the loads after the m strains, `moved` is V (e, a, 2), and `changed` is U (e, a, c, k), by default 0.
+        The derivative with respect to s is int (de_i + div V e_i / 2) A e_j plus its transpose, with d grad u = grad U
+        - grad V grad u (deLorenzi, Int. J. Fract. 19 (1982) 183).  A is (v, v), `uniform` (v - m, k) the loads after
+        the m strains in e, `moved` V (e, a, 2), and `changed` U (e, a, c, k), by default 0.
         """
         grad_V = slopes(self.gradients, moved[..., None])[..., 0]
         div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
@@ -236,7 +236,7 @@ def slopes(g: Float, u: Float) -> Float:
 
 
 def strains(slope: Float, problem: Problem) -> Float:
-    """Return the strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
+    """Return the displacement strains (e, q, m, k) from slopes (e, q, 2, c, k)."""
     strain = np.zeros((*slope.shape[:2], problem.strains, slope.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slope[:, :, d, i]

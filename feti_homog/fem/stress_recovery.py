@@ -28,7 +28,7 @@ LINEAR_AT_ONCE = 1 << 12
 class ElementStresses:
     """The stresses at q points in a slice of elements, under k loads.
 
-    Attributes: the slice `part`, `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
+    Attributes: element slice `part`, integration `points` (e, q, 2), their `weights` (e, q), `stress` (e, q, m, k).
     """
 
     part: slice
@@ -48,8 +48,8 @@ class RecoveredStress:
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) macroscopic strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure.
-        known: tractions that the recovered stresses in linear elements obey.
-        shared: vertex classes (s,), and p coefficients (s, p, m k) of fits that include other pieces of the body.
+        known: tractions that the recovered stresses in linear elements match, or None.
+        shared: vertex classes (s,), and p coefficients (s, p, m k) of fits across body pieces, or None.
     """
 
     points: Float
@@ -92,7 +92,7 @@ class RecoveredStress:
 
     @cached_property
     def numbers(self) -> Int:
-        """Return the vertex numbers (classes,), counted from 0 over vertex classes; meaningless on other classes."""
+        """Return the vertex number of every node class (classes,), counted from 0; meaningless at mid-side nodes."""
         is_vertex = np.zeros(len(self.u), bool)
         is_vertex[self.node_class[self.triangles[:, :3]]] = True
         return np.asarray(np.cumsum(is_vertex) - 1)
@@ -145,7 +145,7 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """Return the coefficients (vertices, p, m k) of `polynomials` about every vertex; only of 1 in order 1."""
+        """Compute the coefficients (vertices, p, m k) of `polynomials` about vertices; p = 1 for linear elements."""
         neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
@@ -163,7 +163,7 @@ class RecoveredStress:
         return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
 
     def patch_sums(self) -> tuple[Float, Float]:
-        """Sum w P^T P (vertices, p, p) and w P^T sigma (vertices, p, m k) about every vertex, for `polynomials` P."""
+        """Sum w P^T P (vertices, p, p) and w P^T sigma (vertices, p, m k): weights w, `polynomials` P at a vertex."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for chunk in self.elements:
             corners = self.points[self.triangles[chunk.part, :3]]

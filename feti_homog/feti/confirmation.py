@@ -1,4 +1,4 @@
-"""Compute dual solutions by influence columns, and confirm some of these solutions by products F lambda."""
+"""Solve the dual problem by influence columns (`exact`), and test some solutions by products F lambda."""
 
 import numpy as np
 from mpi4py import MPI
@@ -15,10 +15,10 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """A dual solver by influence columns H, which confirms only some solutions by F lambda.
+    """A dual solver by influence columns, the columns of an exact inverse H; F lambda tests only some solutions.
 
-    If a solve with F lambda confirms the n solves before it, the next min(2 n + 1, MOST_UNCONFIRMED) solves skip
-    F lambda: this number is the quota.
+    F is the dual operator.  If a solve with F lambda confirms the n solves before it, the next min(2 n + 1,
+    MOST_UNCONFIRMED) solves skip F lambda: this number is the quota.
     """
 
     def __init__(
@@ -39,11 +39,11 @@ class InfluenceSolutions:
         self._squares = np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Solve for loads `strains` (k, v) by influence columns, or return None if F lambda is due.  Collective.
+        """Solve for loads `strains` (k, v) by influence columns; return None if F lambda must solve.  Collective.
 
-        F lambda is due if the quota is used up, if the jump of a load on the active rows is at most LEAST_FOLLOWED
+        F lambda must solve if the quota is used up, if the jump of a load on the active rows is at most LEAST_FOLLOWED
         times its jump on all rows, or if influence columns and coarse space disagree about the number of free motions.
-        `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
+        `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.  Solutions lack alpha.
         """
         self._prediction = None
         if not self._quota:
@@ -67,17 +67,17 @@ class InfluenceSolutions:
         return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
 
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
-        """Compute the multipliers H d E (owned rows, k) for loads E (v, k).  Collective.
+        """Compute multipliers H d E (owned rows, k) that close the jumps d E, for loads E (v, k).  Collective.
 
-        If `solutions` has just made a prediction, return column j of the predicted multipliers times `weights[j]`.
+        Column j of E is `weights[j]` times load j of the last `solutions`; multipliers predicted there are reused.
         """
         return self._inverse.multipliers(d, E) if self._prediction is None else self._prediction[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Compare solutions by F lambda with predictions, and renew the quota; `d` is as in `solutions`.  Collective.
+        """Compare solutions by F lambda with the last prediction, and set the quota.  Collective.
 
-        The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is empty: a load has no jump
-        on active rows.  An error above MOST_FOLLOWED_ERROR and twice the rounding of F lambda renews the answer.
+        `d` is as in `solutions`.  The quota drops to 0 if a solution iterated or did not converge, or if `solutions` is
+        empty: a load has no jump on active rows.  Errors above MOST_FOLLOWED_ERROR and twice F's rounding renew H d.
 
         Raises:
             ConvergenceError: predicted multipliers have a relative error above MOST_UNCONFIRMED_ERROR.
@@ -108,12 +108,11 @@ class InfluenceSolutions:
             self._squares = distributed_arrays.allreduce_sum(self._comm, np.stack([active.T @ active, d.T @ d]))
 
     def _errors(self, lam: Float, opening: Float, residuals: Float | float = 0.0) -> tuple[float, float]:
-        """Compute the largest errors of predicted multipliers and of predicted jumps.  Collective.
+        """Compute the largest relative errors of predicted multipliers, and of predicted jumps.  Collective.
 
-        For every load, errors are relative to the largest entry in `lam` and in `opening`, both (owned rows, k).  Jumps
-        count only if no body is free to move.  Multipliers may cancel, for example where bonds are pressed, so the
-        scale of multipliers is at least LEAST_FOLLOWED times the multipliers under single strains.  `residuals` (k,)
-        are relative errors in `lam`.
+        Errors of a load are relative to the largest entry in `lam`, or in `opening`, both (owned rows, k).  Jumps count
+        only without free bodies.  Multipliers may cancel, as in pressed bonds, so their scale is at least
+        LEAST_FOLLOWED times the sum of magnitudes under single strains.  `residuals` (k,) are relative errors in `lam`.
         """
         assert self._prediction is not None
         predicted, jumps, terms = self._prediction

@@ -27,7 +27,7 @@ class DualSolution:
         alpha: (kernel dimension,) rigid-body amplitudes; None if F lambda was not computed for these multipliers.
         iterations, reason: iterations of the Krylov method, and PETSc's KSPConvergedReason.
         residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell there; without alpha, the
-            residual of the last solution with alpha.
+            largest residual of the last solutions with alpha.
         compliance: (owned rows,) compliance C of the springs, length per nodal force.
     """
 
@@ -74,15 +74,15 @@ class ActiveJumps:
     def projected(self, x: Float) -> Float:
         """Compute P x for jumps x (owned rows, k), restricted to the active rows.
 
-        P is applied twice: a single product leaves rounding of rigid-body motions, on which a Krylov method stalls.
+        P is applied twice: rounding of a single product contains rigid-body motions, which stall a Krylov method.
         """
         return self.natural.project(self.natural.project(self.active.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, active: Float, torn: Float) -> Float:
         """Bound the rounding (k,) in jumps of the torn cell on active rows, under loads (v, k).
 
-        The bound is ZERO_JUMP times `torn`.  If an `active` norm lies between this bound and the square root of the
-        machine precision times `torn`, all bounds are at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
+        The bound is ZERO_JUMP times `torn`.  If an `active` norm lies between this bound and sqrt(eps) times `torn`,
+        with the machine precision eps, all bounds are at least ROUNDING_MARGIN times the estimate by `jump_rounding`.
 
         Args:
             displacement: (boundary dofs, v) displacements of the torn cell under unit loads, the same at every call.
@@ -100,7 +100,7 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Compute amplitudes alpha, jumps and residuals for multipliers `lam` (owned rows, k).
+        """Make the solutions for multipliers `lam` (owned rows, k), with amplitudes alpha, jumps and residuals.
 
         `strains` (k, v) are the loads E; `jump` (owned rows, k) is d E - (F + C) lam, without rigid-body motions; the
         residuals are relative to `scale` (k,).  `iterations` and `reason` are stored in the solutions.
@@ -123,7 +123,7 @@ class ActiveJumps:
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def superposed(self, solutions: Sequence[DualSolution], factors: Float, d: Float) -> DualSolution:
-        """Return the sum of k solutions on equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
+        """Sum k solutions with equal active rows, weighted by `factors` (k,); `d` is as in `completed`.
 
         If all solutions have alpha, the sum has alpha, the most iterations, the least reason and a new residual; else
         alpha is None, and the other numbers are from the first solution.
@@ -143,7 +143,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Compute alpha, jumps and residual of a solution in the present state, by F lambda.
+        """Complete a solution of the present state: return it with alpha, jumps and residual by F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
@@ -158,7 +158,7 @@ def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
     """Estimate the rounding (owned rows, v) of jumps B u.  Collective.
 
     For `displacement` u = K+ f (boundary dofs, v) and machine precision eps, the estimate is B K+ (eps diag(K) |u|)
-    with random signs: jumps under forces as large as the rounding of K u, which may move soft subdomains far.
+    with random signs: jumps under forces as large as the rounding of K u.  Such forces may move soft subdomains far.
     """
     signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
     forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs

@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner (M^-1, H_0 or an exact inverse), P the projector of `coarse.natural`; F includes springs, C.
+F is the dual operator with springs, H its preconditioner, and P the projector of `coarse.natural`.
 
 A PETSc vector holds the multipliers of k load cases, with the k values of a row side by side, so that one Krylov
 iteration advances all load cases.  `CallbackErrors` stores exceptions of the contexts until PETSc has returned.
@@ -53,7 +53,7 @@ class ProjectedProblem:
             z.setArray(self._projected(lambda: self._preconditioner.apply(self._residual)))
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
-        """Project the result of `vectors()` and flatten it; return NaN from the first exception on.  Collective."""
+        """Project the result of `vectors()` and flatten it; from the first exception on, return NaN.  Collective."""
         nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
@@ -83,12 +83,12 @@ class Stall:
 class PrimalTest:
     """PETSc's convergence test: the primal residuals of force and, with CG or FCG, of jump must fall below rtol.
 
-    The jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual is
-    |P H r| / |P M^-1 P d|, relative to the forces that close d.  Small dual residuals can hide large primal ones.
+    For the residual r, the jump residual is |P r| / |P d|, relative to the jump d of the torn cell; the force residual
+    is |P H r|, relative to the norm of the forces that close d (`Preconditioner.closing_forces`).
 
     Attributes:
         ends_on_stall: whether a stall ends the solve, as a breakdown.
-        jump_scale, force_scale: |P d| and |P M^-1 P d| for the next solve.
+        jump_scale, force_scale: |P d|, and the norm of the forces that close d, for the next solve.
     """
 
     def __init__(self, problem: ProjectedProblem) -> None:
@@ -165,7 +165,7 @@ class Krylov:
         self.ksp.setComputeSingularValues(permitted <= max(MAX_ITERATIONS, sizes[1]))
 
     def solve(self, lam: Float, right: Float) -> tuple[Float, Float, int, int]:
-        """Solve P F lam = `right` for projected jumps `right` (rows, k), starting from `lam` (rows, k).  Collective.
+        """Solve P F lam = `right` for projected jumps `right` (owned rows, k), starting from `lam`.  Collective.
 
         With an adaptive coarse space the condition number is small (proven with all rows active, measured otherwise),
         so only rounding stalls the iteration.  A stalled iteration restarts from its last multipliers, with their
@@ -174,7 +174,7 @@ class Krylov:
         On several ranks, an exception in a callback ends the job, unless all ranks raise a FetiHomogError.
 
         Returns:
-            Multipliers lam (rows, k), F lam (rows, k) on all rows, number of iterations, PETSc's converged reason.
+            Multipliers lam (rows, k), F lam (rows, k), also on inactive rows, iterations, PETSc's converged reason.
         """
         iterations, jumps = 0, self._jumps
         for restart in range(MAX_RESTARTS + 2):

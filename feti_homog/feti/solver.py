@@ -4,11 +4,11 @@ With f = -Q E for a load E (v,), which begins with the macroscopic strain, Eqs. 
 
     (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
 
-C is the compliance of elastic bonds: their faces part by B u* = C lam.  Rigid bonds (glue) have C = 0.
+Here F = B K+ B^T and G = B R, with the jumps B u, and kernel R and generalized inverse K+ of the stiffness K.  C is the
+compliance of elastic bonds, whose faces part by B u* = C lam; rigid bonds (glue) have C = 0.
 
-Where tractions t = Sigma n act on the sides, Sigma (m,) follows E among the loads.  Sigma is chosen so that
-int u* (x) n ds = 0 on the sides: then E is the mean strain and Sigma the mean stress (`FetiSolver.closure`).
-Tractions do work on rigid-body motions of subdomains: then G^T lam = -R^T Q E.
+Tractions t = Sigma n on the sides follow E among the loads as Sigma (m,), such that int u* (x) n ds = 0 there: E is the
+mean strain, Sigma the mean stress (`FetiSolver.closure`).  With their work on rigid motions, G^T lam = -R^T Q E.
 """
 
 import weakref
@@ -47,9 +47,9 @@ class FetiSolver:
         interface_operators: S and S+ of the local subdomains.
         intact_compliance: (owned rows,) C of the intact springs.
         operator: F + C.
-        preconditioner: M^-1, or H_0 with the adaptive coarse space, or an exact inverse H.
+        preconditioner: preconditioner of F + C, as chosen by `solver_plan.choose`.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
-        natural: rigid-body motions, G and P.
+        natural: natural coarse space of rigid-body motions, with G and the projector P.
         adaptive: adaptive coarse space of the preconditioner, None without one.
         coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active, jumps: rows that carry multipliers; projections and norms of the jumps there.
@@ -175,21 +175,21 @@ class FetiSolver:
 
     @cached_property
     def _pushes(self) -> Float:
-        """Compute the work R^T Q (owned modes, v + m) of tractions on kernels; 0 for the v strains."""
+        """Compute the work R^T Q (owned modes, v + m) of tractions on kernels; 0 for the v unit loads."""
         pushes: Float = np.concatenate([self.condensed.boundary[:0], *(s.R.T @ s.Q for s in self.subdomains)])
         pushes[:, : len(self.problem.loads)] = 0.0
         return pushes
 
     @property
     def is_pulled(self) -> bool:
-        """Return whether tractions are given on the sides, and subdomains have rigid motions."""
+        """Return whether tractions act on the sides, and subdomains have rigid-body motions."""
         return self.natural.kernel_dimension > 0 and self.condensed.boundary.shape[1] > len(self.problem.loads)
 
     @property
     def closure(self) -> Float:
-        """Return loads (v, v) of unit strains, or (v + m, v) with tractions Sigma for which E is the mean strain.
+        """Return the v unit loads as columns: I (v, v), or (v + m, v) with tractions Sigma on the sides below I.
 
-        Collective when first read in a state; raises NotCarriedError if tractions pull at a free body.
+        Sigma makes unit strains mean strains; raises NotCarriedError if tractions pull at a free body.  Collective.
         """
         v, n = len(self.problem.loads), self.condensed.boundary.shape[1]
         if n > v and not self._units:
@@ -215,7 +215,7 @@ class FetiSolver:
 
         Args:
             strains: (k, v) loads E, or (k, v + m) loads with given Sigma.
-            starts: (owned rows, k) initial multipliers.
+            starts: (owned rows, k) initial multipliers; ignored if `preconditioner.is_exact`.
         """
         k, columns = len(strains), (None if self.is_pulled else self._by_columns)
         if strains.shape[1] == len(self.problem.loads):
@@ -277,7 +277,7 @@ class FetiSolver:
         return np.concatenate([u[:0], *(self.extended(i, u, solution.strain) for i in range(len(self.subdomains)))])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """Extend u (boundary dofs, k) to all dofs of the subdomain `place`, by `InterfaceOperators.extend`."""
+        """Extend u (boundary dofs, k) to subdomain `place`; other arguments are as in `InterfaceOperators.extend`."""
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 

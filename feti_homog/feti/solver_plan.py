@@ -44,7 +44,7 @@ class SolverOptions:
 
     Attributes:
         preconditioner: `-feti_pc_type`, one of PRECONDITIONERS.
-        operator: `-feti_dual_operator`, one of KINDS; by default explicit with `-feti_pc_type influence`.
+        operator: `-feti_dual_operator`, one of KINDS; by default explicit with `-feti_pc_type influence`, else auto.
         coarse_space: `-feti_coarse_space`, one of COARSE_SPACES.
         threshold: `-feti_coarse_threshold`, the bound tau of soft modes.
     """
@@ -95,7 +95,7 @@ class ProblemSizes:
         shared_dofs: degrees of freedom on shared nodes, with all bonds intact.
         has_thin: whether a body is thin.  A thin ring bends easily but resists a change of its thickness.  No scaling
             reflects both: with the Dirichlet preconditioner, a solve takes hundreds of iterations or does not converge.
-        one_each: whether there are several ranks with one subdomain each, and a subdomain has several materials.
+        one_each: whether every one of several ranks has one subdomain, and a subdomain has several materials.
     """
 
     applications: int
@@ -121,7 +121,7 @@ class SolverPlan:
 
     @property
     def in_words(self) -> str:
-        """Return the name of the method, as `check` prints it."""
+        """Return the names of preconditioner and coarse space, as `check` prints them."""
         if self.preconditioner == "influence":
             return "influence columns, an inverse of the bonded cell"
         if self.preconditioner == BONDED:
@@ -136,11 +136,11 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     With dense operators and no option for the adaptive space, the default is influence columns if a body is thin, or if
     at least `influence_applications` products follow and at most `assembled_schur_dofs` dofs are shared.  Otherwise,
     with dense operators and no option for a coarse space, the default is BONDED if `one_each` holds and 1 to
-    `dense_boundary_dofs` dofs are shared.  In all other cases it is "dirichlet".
-    With "dirichlet", the coarse space is adaptive on request, or if bodies are cut and all subdomains are searchable.
+    `dense_boundary_dofs` dofs are shared.  Else it is "dirichlet", with an adaptive coarse space on request, or if
+    bodies are cut and all subdomains are searchable.  An option "influence" without shared dofs means "none".
 
     Raises:
-        CaseError: two options exclude each other.
+        CaseError: options exclude each other.
     """
     preconditioner = options.preconditioner
     if preconditioner == "influence" and not sizes.shared_dofs:
@@ -181,10 +181,10 @@ class SolverParts:
     """The parts of a solver: boundary operators, preconditioner and coarse spaces.
 
     Attributes:
-        operators, preconditioner, natural: boundary operators; M^-1, H_0 or H; rigid-body motions, G and P.
-        adaptive: adaptive coarse space of the preconditioner, None without one.
+        operators, preconditioner: boundary operators S and S+; preconditioner of the dual operator and springs.
+        natural, adaptive: natural coarse space; adaptive coarse space of the preconditioner, None without one.
         exact_inverse: the preconditioner if it is made from influence columns, else None.
-        method: names of preconditioner and coarse space for the summary.
+        method: names of preconditioner and coarse space, from `SolverPlan.in_words`.
     """
 
     operators: InterfaceOperators
@@ -243,7 +243,7 @@ def build(
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
     Args:
-        applications: expected number of products with F.
+        applications: expected number of products with the dual operator.
         compliance, soften: (owned rows,) compliance C of the intact springs, and whether C may grow.
         recovers: whether the run needs interior displacements.  If so, and with `ProblemSizes.one_each`, subdomains
             keep their factors, because a second factorization would take the same memory.

@@ -18,13 +18,13 @@ class Thresholds:
     Attributes:
         dense_boundary_dofs: largest number n of boundary dofs for which `-feti_dual_operator auto` makes dense
             matrices of 8 n^2 bytes; also bounds the rows of a dense assembled Schur complement.
-        soft_mode: tau: displacements p with S p = theta N p, theta < tau, are soft.  The default of
-            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]:
-            30, 20, 17, 14 iterations; 4.4, 5.4, 6.3, 7.3 vectors.
+        soft_mode: bound tau: modes with theta < tau are soft, see `coarse.local_eigenproblems`.  The default of
+            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]: 30, 20,
+            17, 14 iterations; 4.4, 5.4, 6.3, 7.3 vectors.
         face_factor: factor on tau in a face eigenproblem, which lacks the energy of the rest of the body.
             Measured [0.6, 0.8, 1, 1.25]: 20, 17, 16, 16 iterations; 7.5, 8.8, 9.5, 10.7 vectors.
-        face_layers: coarse triangles between a face and the far side of its neighbourhood.  Measured [1, 2, 3]: 15,
-            16, 17 iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that the body does not have.
+        face_layers: layers of coarse triangles in the neighbourhood of a face.  Measured [1, 2, 3]: 15, 16, 17
+            iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that the body does not have.
         decayed: displacements of an extended face mode below this fraction of the largest displacement are set to 0.
             Measured [1e-3, 0.01, 0.03, 0.1]: 16, 16, 16, 18 iterations.
         min_trace_dofs: least number of dofs in the trace space of a boundary or a face.  Measured

@@ -98,7 +98,7 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """Store S Z_0 and Z_0^T S Z_0 of the local subdomains `which`; `BW` are their scaled constraints."""
+        """Compute and store S Z_0 and Z_0^T S Z_0 of local subdomains `which`; `BW` are their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.with_springs[i].apply_schur(Z)
@@ -113,12 +113,13 @@ class AdaptiveCoarseSpace:
         """Factor the coarse matrix Z_0^T S Z_0 of all ranks.  Collective.
 
         `part` (u, u) is the contribution of this rank.  The matrix is scaled to a unit diagonal.  Modes of a free fibre
-        have no energy and get no equation; other modes may be linearly dependent.  Adding eps I makes the matrix
-        definite; S_0 then keeps the fraction eps / (mu + eps) of the forces S z of a mode z with scaled energy mu.
+        have no energy and get no equation; other modes may be linearly dependent.  Adding eps I, eps in
+        COARSE_REGULARISATIONS, makes the matrix definite; S_0 then keeps the fraction eps / (mu + eps) of the forces of
+        a mode with scaled energy mu.
 
         Raises:
             LinAlgError: rounding leaves the matrix indefinite with all COARSE_REGULARISATIONS.
-            MemoryError, CaseError: as in `DistributedSolver.factor`.
+            MemoryError, CaseError, FetiHomogError: as in `DistributedSolver.factor`.
         """
         self.factorizations += 1
         if not self.coarse_dimension:
@@ -165,7 +166,7 @@ class AdaptiveCoarseSpace:
             return distributed_arrays.scale_rows(self._weights, self.solver.solve(right))
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Iterate over the mode positions, S Z_0, and the slice of boundary dofs of every subdomain."""
+        """Iterate over subdomains: positions of modes in `AveragedModes.reaching`, S Z_0, slice of boundary dofs."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
@@ -176,7 +177,7 @@ class AdaptiveCoarseSpace:
 class Balanced(Preconditioner):
     """The preconditioner H_0 = B_D S_0 B_D^T, with S_0 of `coarse` and B_D of `scaled`.
 
-    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R, so that G^T H_0 r = 0 and H_0 G = 0.
+    For rigid-body motions R and G = B R, S_0 B_D^T B R = S_0 R = 0, so that G^T H_0 r = 0 and H_0 G = 0.
 
     Attributes:
         scaled: the preconditioner without coarse space.

@@ -1,6 +1,6 @@
 """Face neighbourhoods of large bodies, and trace spaces of piecewise linear displacements.
 
-For given face displacements p, the body stores no less energy than the face neighbourhood N:
+Under displacements p of a face, triangles near the face, its neighbourhood N, store no more energy than the body:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
 
@@ -31,7 +31,7 @@ from feti_homog.typing import Float, Int
 def trace_space(
     submesh: Submesh, lattice: ReferenceLattice, problem: Problem, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
 ) -> csr_matrix:
-    """Build the prolongation P (c n, c m) from m to n boundary nodes.
+    """Build the prolongation P (c n, c m) of the trace space, from m to n boundary nodes.
 
     `nodes` (n,) are sorted node classes of the refined piece, with c components; c m >= min(c n, `min_dofs`).  Edge
     ends that are not boundary nodes have zero displacement.
@@ -93,7 +93,7 @@ class FaceNeighbourhood:
         at: (n,) positions of the face dofs among the boundary dofs of the body.
         operator: dense boundary operators of the neighbourhood.
         R: (n, k) kernel on the face.
-        P: (n, m) trace space.
+        P: (n, m) prolongation from the trace space.
         S_fixed: (n, n) stiffness of the face while the other faces and all nodes outside the neighbourhood are fixed.
     """
 

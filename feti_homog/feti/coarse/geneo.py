@@ -4,8 +4,8 @@ With all soft modes (theta < tau, see `local_eigenproblems`), the largest eigenv
 is at most 1 + N / tau for any geometry and any materials.  N - 1 is the largest number of neighbours of a subdomain
 (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured eigenvalues are about 1 / tau.
 
-Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V.  As B B_D^T = I, B Z_0 = 0: Z_0 are displacements
-of the cell with glued active rows.  A mode reaches (is nonzero on) only its subdomain and the subdomain's neighbours.
+Modes are averaged over node copies: Z_0 = (I - B_D^T B) V with B_D of `adaptive`.  As B B_D^T = I, B Z_0 = 0: Z_0 moves
+the cell with glued active rows.  A mode reaches (is nonzero on) only its subdomain and the subdomain's neighbours.
 """
 
 from collections.abc import Iterator, Sequence
@@ -85,7 +85,7 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """Compute the amplitudes (u, c) of the c translations of the cell.  Collective."""
+        """Express the c translations of the cell by amplitudes (u, c) of the modes.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))

@@ -1,13 +1,13 @@
 """Compute soft modes of a subdomain by eigenproblems on its boundary or its faces.
 
-For a subdomain s with Schur complement S_s and constraints B_s, boundary displacements p with
+For a subdomain s with Schur complement S_s, constraints B_s and preconditioner M^-1, boundary displacements p with
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
 are soft in s but stiff in the preconditioner.  On a large boundary, this dense eigenproblem costs too much.  But if
 every node belongs to only one other body, the weights of M^-1 hardly change along the boundary: s contributes at most
-S_s to M^-1, and it is the neighbour's contribution that makes p stiff.  Then every face has a separate eigenproblem,
-with the Schur complement of the face neighbourhood instead of S_s.  All eigenproblems are projected to trace spaces.
+S_s to M^-1, and the neighbour's contribution makes p stiff.  Then every face has a separate eigenproblem, with the
+Schur complement of the face neighbourhood instead of S_s.  All eigenproblems are projected to trace spaces.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ class SubdomainBlocks:
         dofs: (n,) boundary degrees of freedom.
         operator: S and S+ of the subdomain with its springs.
         B: (rows, n) constraints.
-        BW: (rows, n) scaled constraints W^-1 B D^-1.
+        BW: (rows, n) scaled constraints W^-1 B D^-1, see `preconditioners`.
         facewise: whether every face has a separate eigenproblem.
     """
 
@@ -60,7 +60,7 @@ class SubdomainEigenproblem:
     def __init__(
         self, block: SubdomainBlocks, operator: DenseOperator, common: Mapping[int, Int], min_trace_dofs: int
     ) -> None:
-        """Build the trace space and the subdomain's part of M^-1; `common` is an item of `Neighbours.common`."""
+        """Build the trace space and the subdomain's part of M^-1; `common` is one item of `Neighbours.common`."""
         self.block, self.common, self._operator, subdomain = block, common, operator, block.subdomain
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
@@ -144,8 +144,8 @@ def eigenproblem(
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
     """Compute the forces f = N p (n, m), N = B^T M B, and project them to R^T f = 0.
 
-    S+ N p is a step of inverse iteration, which turns an eigenvector p (n, m) of the trace space into a displacement of
-    the body itself.  `R` (n, k) is the kernel.  The result has the precision of M.
+    M is M^-1 of the module on the rows of B.  S+ N p, a step of inverse iteration, turns an eigenvector p (n, m) of the
+    trace space into a displacement of the body itself.  `R` (n, k) is the kernel.  f is as precise as M.
     """
     NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
     inverse = np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True)
@@ -158,14 +158,14 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """Compute [P R]^T B^T M B [P R] (m + k, m + k) for P (n, m), R (n, k) and symmetric M."""
+    """Compute energy products [P R]^T B^T M B [P R] (m + k, m + k); P (n, m), R (n, k), M as in `jump_forces`."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(S: Float, N: Float, threshold: float) -> Float:
-    """Compute the soft eigenvectors q (m, j): P^T S_s P q = theta P^T N_s P q with theta < `threshold`.
+    """Compute the eigenvectors q (m, j) of P^T S_s P q = theta P^T N_s P q with theta < `threshold`; j may be 0.
 
     Args:
         S: (m, m) P^T S_s P for the trace space P (n, m), regularised on the kernel R (n, k) of S_s.

@@ -19,9 +19,9 @@ from feti_homog.typing import Float, Int
 class NaturalCoarseSpace:
     """The rigid-body motions of all subdomains, and P = I - G (G^T G)^-1 G^T.
 
-    P projects onto multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f vanishes, because the load of a
-    macroscopic strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every
-    kernel mode.  A rank stores its owned rows of G, and a factor of G^T G or a part of it (`DistributedSolver`).
+    P projects onto multipliers in equilibrium, G^T lam = 0: in Eq. (37) R^T f = 0, because the load f of a macroscopic
+    strain does no work on rigid-body motions.  G has a row for every multiplier and a column for every kernel mode.  A
+    rank stores its owned rows of G, and a factor of G^T G or a part of it (`DistributedSolver`).
 
     Attributes:
         kernel_dimension: number m of kernel modes in the cell.
@@ -29,9 +29,9 @@ class NaturalCoarseSpace:
         R: (boundary dofs, owned modes) kernels on the boundaries.
         G: (owned rows, m) jumps of the modes.
         body: (m,) body numbers of the modes.
-        pinned_body: body with held nodes or with supporting springs, the last of several; -1 without such a body.
+        pinned_body: last body with held nodes or supporting springs; -1 without such a body.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
-        unknowns: (u,) numbers of owned modes, and of modes in owned rows of G or in local unconstrained modes.
+        unknowns: (u,) modes that this rank needs: owned ones, and those in owned rows of G or in unconstrained modes.
         factorizations: number of factorizations of G^T G.
         solver: solver for G^T G.
     """
@@ -96,9 +96,10 @@ class NaturalCoarseSpace:
 
     @cached_property
     def _gram(self) -> GramMatrix:
-        """Return G^T A G, which stores 36 products for a row between two bodies.  Collective when first read.
+        """Set up the matrix G^T A G of changing active rows A.  Collective when first read.
 
-        Modes of the pinned body are left out: its pieces are glued together and cannot move.
+        In the plane, a row between whole bodies takes 36 products.  Modes of the pinned body are left out: its pieces
+        are glued together and cannot move.
         """
         return GramMatrix(self.comm, self.G, np.flatnonzero(self.body != self.pinned_body))
 
@@ -107,7 +108,7 @@ class NaturalCoarseSpace:
         return self._gram.null_space(active, ZERO_TOLERANCE * self._diagonal)
 
     def amplitudes(self, x: Float) -> Float:
-        """Compute (G^T G)^-1 G^T x (m,) or (m, k) for x (owned rows,) or (owned rows, k).  Collective."""
+        """Compute amplitudes (G^T G)^-1 G^T x (m,) or (m, k) of x (owned rows,) or (owned rows, k).  Collective."""
         if not self._is_factored:
             self.factor()
         positions = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
@@ -116,7 +117,7 @@ class NaturalCoarseSpace:
         return distributed_arrays.allreduce_sum(self.comm, amplitudes)
 
     def balancing(self, forces: Float) -> Float:
-        """Compute G (G^T G)^-1 e (owned rows, k): the least-norm lam with G^T lam = e.  Collective.
+        """Compute the least-norm multipliers lam = G (G^T G)^-1 e (owned rows, k) with G^T lam = e.  Collective.
 
         `forces` (owned modes, k) are the rows of e for local subdomains; lam is 0 on inactive rows.
         """
@@ -127,7 +128,7 @@ class NaturalCoarseSpace:
         return np.asarray(self._G @ self.solver.solve(right))
 
     def project(self, x: Float) -> Float:
-        """Compute P x for x (owned rows,) or (owned rows, k) that is 0 on inactive rows.  Collective."""
+        """Compute the projection P x of x (owned rows,) or (owned rows, k), 0 on inactive rows.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         if not self._is_factored:
@@ -144,7 +145,7 @@ class GramMatrix:
     """The matrix G^T A G for changing active rows A = diag(a), summed from stored products."""
 
     def __init__(self, comm: MPI.Intracomm, G: csr_matrix, movable: Int) -> None:
-        """Multiply all pairs of entries in each row of G, and group the `movable` modes.  Collective."""
+        """Store the products of all entry pairs in each row of G, and group the `movable` modes.  Collective."""
         self._comm, self._m = comm, G.shape[1]
         count = np.diff(G.indptr)
         # For every row, its number of products, and the number of the first; for every product, its entry and value.
@@ -184,7 +185,7 @@ class GramMatrix:
     def null_space(self, active: Float, tolerance: Float) -> csc_matrix:
         """Compute a basis (m, z) for the null space of G^T A G.  Collective.
 
-        `active` (owned rows,) is a.  In a group of coupled modes, eigenvalues up to the largest `tolerance` (m,) are 0.
+        `active` (owned rows,) is a.  Among coupled modes, eigenvalues up to the largest `tolerance` (m,) count as 0.
         """
         padded, columns = np.append(self.entries(active), 0.0), 0
         rows, numbers, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
@@ -206,7 +207,7 @@ class GramMatrix:
         return Z
 
     def groups(self, modes: Int) -> list[Int]:
-        """Group `modes` that G^T G couples; return an array (groups, size) for every group size."""
+        """Group the numbers `modes` by couplings in G^T G; return an array (groups, size) for every group size."""
         position = np.full(self._m, -1)
         position[modes] = np.arange(len(modes))
         i, j = position[self._rows], position[self._columns]

@@ -177,7 +177,7 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """Count the node copies in the outer and the inner body of every row.
+        """Count the node copies in the outer and the inner body at every row that connects two bodies.
 
         Returns:
             (local rows, 2) copies in the outer and the inner body, and (local rows,) number of the inner body; rows
@@ -211,5 +211,5 @@ class ConstraintLayout:
 
 
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
-    """Return the entity and the position p on it for every fine node; `entities` (e,) have `nodes` (e,) fine nodes."""
+    """Return the entity and position p of all fine nodes, for entities (e,) with `nodes` (e,) fine nodes each."""
     return np.repeat(entities, nodes), distributed_arrays.ranges(np.zeros_like(nodes), nodes)

@@ -76,17 +76,17 @@ class Neighbours:
 
 
 class InterfaceNeighbours:
-    """The n interface nodes of the cell in row order, and their adjacency.
+    """The n interface nodes of the cell in row order, and adjacent nodes.
 
     Attributes:
-        rows: (n,) first global row of the bond.
+        rows: (n,) first global row of the bond at every node.
         first: number of the first node on this rank; 0 on a rank without nodes.
         adjacency: (n, n) matrix with 1 between adjacent nodes.
         near: (n, most neighbours + 1) every node and its neighbours, padded with the node.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Find adjacent nodes along interfaces; rows of a rank ascend.  Collective."""
+        """Find adjacent nodes along interfaces; the rows of every rank must ascend.  Collective."""
         rows = jump_operator.owned[0] + jump_operator.nodes.row
         self.comm = comm
         self.rows: Int = np.concatenate(comm.allgather(rows))
@@ -116,9 +116,9 @@ class InterfaceNeighbours:
         self.near[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Return global rows (k,) and rows at nodes around, at least `enough` in all, in ascending order.
+        """Extend global `rows` by rows at adjacent nodes, ring by ring, to at least `enough` rows in ascending order.
 
-        `choose` selects new rows from candidates.  With no further adjacent node, the result may have fewer rows.
+        `choose` selects new rows from candidates.  The result has fewer rows if no further node is adjacent.
         """
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:

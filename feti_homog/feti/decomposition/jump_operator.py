@@ -1,9 +1,9 @@
 """The jump operator B on one rank, the layout of the multipliers, interface springs, and node blocks.
 
-A fine node has k copies in the subdomains.  Copies within one body are glued in x and y by orthonormal contrasts, and
-can never part.  An inner body, such as a fibre, and the body around it are glued by two rows, along the normal n and
-the tangent, between the means of their copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is
-the gap, and a normal multiplier is the nodal force between the faces, positive in tension.
+A fine node has k copies in the subdomains.  Copies within one body are glued in all components by orthonormal
+contrasts, and can never part.  An inner body, such as a fibre, and the body around it are glued between the means of
+their copies, in the plane by two rows along the normal n and the tangent; this bond can break.  So B has full row rank,
+n.(u_outer - u_inner) is the gap, and a normal multiplier is the nodal force between the faces, positive in tension.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class InterfaceSprings:
     """The springs at all bonded nodes: traction = stiffness x jump, in tension and compression.
 
     Attributes:
-        stiffness: for every interface of the case, stress per length for opening and slip, or for slip along the
-            fibres; inf is rigid.  Without springs, the tuple is empty.
+        stiffness: for every interface of the case, the stiffness in opening and slip, or in slip along the fibres, as
+            stress per length; inf is rigid.  Without springs, the tuple is empty.
         soften: whether the compliance may grow during the run.
     """
 
@@ -39,7 +39,7 @@ class InterfaceSprings:
     soften: bool = False
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
-        """Compute C = 1 / (k l) (owned rows,) for stiffness k and tributary length l; 0 off interfaces."""
+        """Compute the compliance C = 1 / (k l) (owned rows,), stiffness k, tributary length l; 0 without springs."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
         for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
             C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
@@ -101,7 +101,7 @@ class JumpOperator:
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """Gather local rows from x (owned rows,) or (owned rows, k); return x itself if layouts agree.  Collective."""
+        """Gather the local rows of x (owned rows,) or (owned rows, k); x itself if layouts agree.  Collective."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:

@@ -15,14 +15,14 @@ from feti_homog.typing import Int
 
 @dataclass(frozen=True)
 class Partition:
-    """The subdomain (m,) of every coarse triangle, and the rank (s,) of every subdomain."""
+    """The subdomain number (m,) of every coarse triangle, and the rank (s,) of every subdomain."""
 
     subdomain: Int
     rank: Int
 
 
 def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES) -> Partition:
-    """Cut the bodies of a whole cell into pieces, and assign the pieces to `n_ranks` ranks.
+    """Cut the bodies of a whole cell into pieces, the subdomains, and assign them to `n_ranks` ranks.
 
     `parts`, `pieces` and `length_classes` are as in `cut_into_pieces`.
     """
@@ -34,11 +34,10 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classe
 
 
 def halves(torus: Torus) -> Partition | None:
-    """Cut a whole cell into two connected strips for two ranks.
+    """Cut a whole cell into two connected strips for two ranks; return None if a strip is not connected.
 
     The strips run along x or y, with about half the triangles each (within STRIP_SLACK), and with the fewest boundary
-    edges among all candidates; METIS cuts are up to 50 % longer.  Islands of a strip join the other strip.  Returns
-    None if a strip is still not connected.
+    edges among all candidates; METIS cuts are up to 50 % longer.  Islands of a strip first join the other strip.
     """
     tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
@@ -78,7 +77,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     """Compute the subdomain (m,) of every triangle by METIS.
 
     Subdomains are connected through edges: a METIS part that is not connected becomes several subdomains.  METIS makes
-    short cuts, across narrow gaps instead of along them, with which the iteration converges faster.
+    short cuts, across narrow gaps and not along them, so that the iteration converges faster.
 
     Args:
         parts: (m,) body of every triangle: `torus.constituent`, or `torus.plane_parts()`.
@@ -121,7 +120,7 @@ def pieces_for_count(load: Int, count: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """Choose piece counts (b,) of bodies with `load` (b,) triangles; pieces have about `max_dofs` dofs or fewer."""
+    """Choose piece counts (b,) of bodies with `load` (b,) triangles, for up to about `max_dofs` dofs in a piece."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
@@ -132,7 +131,7 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
-    """Divide a graph by METIS into `count` parts (n,) of equal `load` (n,); by default connected and of equal size."""
+    """Return METIS parts (n,) of graph nodes: `count` parts of equal `load` (n,), or connected parts of equal size."""
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

@@ -1,8 +1,8 @@
 """Coarse vertices and edges that subdomains share: constraint numbers, normals and lengths of interfaces.
 
-An entity is a vertex class or a torus edge that belongs to several subdomains, its sharers.  A fine node on an entity
-with k sharers needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints
-and sends the numbers to the ranks of the other sharers.
+An entity is a vertex class or torus edge in several subdomains, its sharers.  A fine node on an entity with k sharers
+needs k - 1 vector constraints.  The rank of the last sharer owns the entity: it numbers the constraints and sends the
+numbers to the ranks of the other sharers.
 """
 
 from dataclasses import dataclass
@@ -37,16 +37,16 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """Integrate tributary lengths (k, order + 1) of side nodes from s = `low` (k,) to `low` + `side`; see `along`."""
+    """Compute tributary lengths (k, order + 1) of nodes on sides from s = `low` (k,) to `low` + `side`; see `along`."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
 def breakable_pairs(meshes: SubmeshesOfRank, table: submeshes.SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
-    """Return `SharedEntities.pair` (n,) of all shared entities; `pairs` is as in `share_entities`.
+    """Return the numbers `SharedEntities.pair` (n,) of all shared entities; `pairs` is as in `share_entities`.
 
-    The pair is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
+    The number is -1 where bonds never break, where a third body touches, and where two bodies meet in a point.
     """
     body, copies = table.body[sharers.sharer], sharers.copies
     outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
@@ -68,7 +68,7 @@ def interface_geometry(
 ) -> tuple[Float, Float, Bool]:
     """Compute normal, turn and precracked of `SharedEntities` on owned entities.  Collective.
 
-    Values elsewhere, and where bonds never break, have no meaning.  Arguments and MeshError are as in `share_entities`.
+    Values elsewhere, or where no bond can break, have no meaning.  Arguments and MeshError are as in `share_entities`.
     """
     n, owner = len(sharers.key), table.rank[sharers.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(meshes, table, pairs, sharers) >= 0)
@@ -144,7 +144,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: I
 
 
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Compute outward normals (n, 2, 2) at both ends of edges, and turns (n,), as in `SharedEntities`.
+    """Compute normals (n, 2, 2) out of triangles at both ends of edges, and turns (n,), as in `SharedEntities`.
 
     `triangle` (n,) are triangles or pixels, and `k` (n,) positions of the edges in them.
     """
@@ -173,9 +173,9 @@ class SharedEntities(Sharers):
         first: (n,) number of the first vector constraint.
         body: (sharers,) body of every sharer.
         fibre: (n,) inner body, which may debond from the outer body; -1 where no bond can break.
-        pair: (n,) case interface between both bodies; -1 where no bond can break.
-        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for
-            s in [0, 1]; at a vertex, two equal normals of its tributary length.
+        pair: (n,) number of the interface in the case; -1 where no bond can break.
+        normal: (n, 2, 2) normals from the inner to the outer body at both ends of the edge, of length |dx / ds| for s
+            in [0, 1]; at a vertex, two equal normals as long as the vertex's tributary length.
         turn: (n,) turn of the edge in radians, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the edge, or every edge at the vertex, is debonded in the mesh.
         owned: half-open range of the vector constraints that this rank owns.
@@ -195,7 +195,7 @@ class SharedEntities(Sharers):
 
     @property
     def pieces(self) -> set[int]:
-        """Return the subdomains at entities that have more than two sharers, or two sharers in one body."""
+        """Return subdomains with an entity that belongs to three or more subdomains, or to two in one body."""
         body = self.body
         between_two = (self.copies == 2) & (body[self.pointer[:-1]] != body[self.pointer[1:] - 1])
         return set(self.sharer[~np.repeat(between_two, self.copies)].tolist())
@@ -207,7 +207,7 @@ def share_entities(
     """Find the shared entities of this rank, and number their constraints rank by rank.  Collective.
 
     Args:
-        pairs: (phases, phases) case interface between two phases, -1 where bonds never break.
+        pairs: (phases, phases) number of the interface in the case, -1 where bonds never break.
         lattice: reference lattice of the coarse triangles.
 
     Raises:

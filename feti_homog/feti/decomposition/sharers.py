@@ -1,8 +1,8 @@
 """Find the subdomains that share coarse vertices and edges, by messages between all ranks.
 
-A vertex or edge has a key, and a home rank: key modulo ranks.  Every rank sends the keys that several subdomains may
-share to the home ranks, with the rank's own subdomains at each key.  A home rank sorts all subdomains of a key, and
-sends the list to every rank with one of these subdomains.
+A vertex or edge has a key, and a home rank: the key modulo the number of ranks.  Every rank sends the keys that several
+subdomains may share to the home ranks, with the rank's own subdomains at each key.  A home rank sorts all subdomains of
+a key, and sends the list to every rank with one of these subdomains.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Sharers:
     Attributes:
         key: (n,) vertex class or torus edge.
         is_edge: (n,) whether the entity is an edge.
-        pointer, sharer: sharer[pointer[i]:pointer[i + 1]] are the subdomains that share entity i, from the outermost
-            body to the innermost.
+        pointer, sharer: sharer[pointer[i]:pointer[i + 1]] are the subdomains at entity i, from the outermost body to
+            the innermost.
     """
 
     key: Int
@@ -40,7 +40,7 @@ class Sharers:
 
     @property
     def innermost(self) -> Int:
-        """Return the last sharer (n,) of every entity."""
+        """Return the last sharer (n,) of every entity, in the innermost body."""
         return np.asarray(self.sharer[self.pointer[1:] - 1])
 
     @property
@@ -90,9 +90,9 @@ def find_sharers(comm: MPI.Intracomm, meshes: SubmeshesOfRank, table: submeshes.
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """Return unique pairs (key, member) for keys with several members, or at the border.
+    """Return unique pairs (key, member), two arrays (k,), of `keys` (t, corners) and local subdomains `member` (t,).
 
-    `keys` (t, 3) and `member` (t,) belong to triangles; negative keys are skipped.  `at_border` is (number of keys,).
+    Only keys with several members, or `at_border` (number of keys,), count; negative keys are skipped.
     """
     n = int(member.max(initial=0)) + 1
     # One member of each key; the key is shared if another member differs.  The last entry is for negative keys.

@@ -32,9 +32,9 @@ class Subdomain:
         areas: (materials,) area of every material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             without the motions that held classes prevent; k = 0 if springs hold the subdomain.
-        held: classes with u* = 0: pinned classes, and the nodes on sides that move by E x.
+        held: node classes with u* = 0: pinned classes, and nodes on sides with the displacement E x.
         positions: (n, 2) unwrapped positions of the classes.
-        is_thin: whether the body is thin, such as a ring much thinner than its radius: K+ is ill-conditioned.
+        is_thin: whether the body is thin, such as a ring much thinner than its radius, so that K+ is ill-conditioned.
         is_outer: whether no other body lies around the body.
         mixed: whether elements have a bubble and an internal pressure, see `assembly.assemble`.
     """
@@ -148,14 +148,14 @@ class Subdomain:
 
     @property
     def volume_stiffness(self) -> Float:
-        """Return |Omega| L (v, v), with tractions on the sides padded by 0 to (v + m, v + m)."""
+        """Return the stiffness |Omega| L (v, v), padded by 0 to (v + m, v + m) with tractions on the sides."""
         C = np.zeros((self.Q.shape[1],) * 2)
         C[: len(self.L), : len(self.L)] = self.area * self.L
         return C
 
     @property
     def loads_inside(self) -> bool:
-        """Return whether unit loads act on nodes that are not shared: at voids and sides, or where materials meet."""
+        """Return whether unit loads act on nodes that are not shared: at voids or sides, or where materials meet."""
         is_pulled = self.Q.shape[1] > len(self.L)
         return self.material is not None or is_pulled or bool(self.submesh.at_void.any())
 
@@ -192,9 +192,9 @@ class Subdomain:
     def compressible_share(self) -> float:
         """Compute the factor (min(lambda, 2 mu) + 3 mu) / (lambda + 3 mu) for the diagonal of K that scales jumps.
 
-        Single nodes of mixed elements are as stiff as lambda, boundary motions at constant volume only as mu.  The
-        factor is 1 without mixed elements, and for several materials, which are all far from incompressible.  lambda
-        and mu are the Lame constants of L.
+        lambda and mu are the Lame constants of L.  Single nodes of mixed elements are as stiff as lambda, boundary
+        motions at constant volume only as mu.  The factor is 1 without mixed elements, and for several materials, of
+        which none is nearly incompressible.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0
@@ -245,18 +245,18 @@ class Subdomain:
         return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
 
     def regularised(self, K: csr_matrix, candidates: Int) -> csr_matrix:
-        """Compute K + rho Rf Rf^T (cn, cn); see `fixing`."""
+        """Compute the definite matrix K + rho Rf Rf^T (cn, cn); see `fixing`."""
         return (K + self._springs(K, candidates)).tocsr()
 
     def _springs(self, K: csr_matrix, candidates: Int) -> csr_matrix:
-        """Return rho Rf Rf^T (cn, cn); see `fixing`."""
+        """Assemble rho Rf Rf^T (cn, cn), the stiffness of springs at fixing nodes; see `fixing`."""
         dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
         return csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, held: Int) -> Float:
-    """Compute an orthonormal kernel (cn, k) at n positions: translations, a turn if `rotates`; `held` nodes rest."""
+    """Compute an orthonormal kernel (cn, k): translations, and a turn if `rotates`, with `held` nodes at rest."""
     n, c = len(positions), problem.components
     free = np.zeros((n, c, 0)) if len(held) else np.tile(np.eye(c), (n, 1, 1))
     if rotates and problem.turns and len(held) < 2:

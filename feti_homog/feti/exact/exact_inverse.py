@@ -34,7 +34,7 @@ class ExactInverse(Preconditioner):
         norm: upper bound of |H|.
         factorizations: number of reference cells factored so far.
         batch: least number of columns that are computed together.
-        most_followed: number of columns above which unused columns are dropped; applies from the next reference cell.
+        most_followed: number of columns above which unused columns are dropped, set for the next reference cell.
     """
 
     is_exact = True
@@ -79,7 +79,7 @@ class ExactInverse(Preconditioner):
             self._restart()
 
     def _follow(self, active: Float, more: Float, pivot: float) -> bool:
-        """Follow columns to the rows `active` with compliance `more`, like `FollowedResponse.follow`.  Collective."""
+        """Follow columns to the state `active`, `more`; return False if a pivot is at most `pivot`.  Collective."""
         gain, sign = more * active - self._more * self._active, self._active - active
         places = np.flatnonzero((sign != 0.0) | (gain != 0.0))
         parts = zip(*self.comm.allgather((self._first + places, sign[places], gain[places])), strict=True)
@@ -94,7 +94,7 @@ class ExactInverse(Preconditioner):
         return True
 
     def _restart(self) -> None:
-        """Factor the cell in its present state, and follow columns from the new response.  Collective."""
+        """Factor the cell with tied bodies and initial springs; follow columns to the present state.  Collective."""
         active, more = self._active, self._more
         self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
         self._followed = FollowedResponse(self.comm, self._first, self.stiffness, self._no_answer, self.most_followed)
@@ -171,7 +171,7 @@ class ExactInverse(Preconditioner):
     def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
         """Select rows without columns: the global `rows` (k,), and active rows nearby up to a full batch.  Collective.
 
-        Neighbours of broken bonds break next, and columns are cheaper together.  If all are inactive, none is added.
+        Neighbours of broken bonds break next, and columns are cheaper together.  Only active `rows` add rows nearby.
         """
         rows, active = followed.lacking(rows), self._are_active
         enough = self.batch if active[rows].any() else 0
@@ -199,19 +199,19 @@ class ExactInverse(Preconditioner):
         return distributed_arrays.scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
-        """Compute Gamma g_A + g_I (owned rows, k): A active in the reference cell, I inactive.  Collective."""
+        """Compute the reference response Gamma g_A + g_I to g (owned rows, k), A active, I inactive.  Collective."""
         inactive = distributed_arrays.scale_rows(1.0 - self.reference.active, g)
         return self.reference.respond(distributed_arrays.scale_rows(self.reference.active, g)) + inactive
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """Compute H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
+        """Compute multipliers H d E (owned rows, k) for loads E (v, k) and `d` as in `renew_answer`.  Collective."""
         return distributed_arrays.scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
-        """Return H d E and the jumps on inactive rows, both (owned rows, k).  Collective.
+        """Return multipliers H d E and jumps on inactive rows, both (owned rows, k).  Collective.
 
         Arguments are as in `multipliers`; `free` is the number of free rigid motions.  Free bodies have one of their
-        possible positions.  Unless `free` pins exist, a changed cell is factored anew, and the result is None.
+        possible positions.  If the number of pins is not `free`, returns None, and factors a changed cell anew.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -223,10 +223,10 @@ class ExactInverse(Preconditioner):
         return lam, U - lam
 
     def renew_answer(self, d: Float) -> Float:
-        """Compute U (owned rows, v) anew from the reference cell's response to `d`; store and return U.  Collective.
+        """Compute the answer U to unit loads (owned rows, v) anew; store and return U.  Collective.
 
-        `d` (owned rows, v), the same in all calls, holds the jumps of the torn cell under unit loads.  The new U has no
-        rounding from earlier updates.
+        U has multipliers on active rows and jumps on inactive rows, from the reference cell's response to `d` (owned
+        rows, v), the same in all calls: jumps of the torn cell under unit loads.  Rounding of earlier updates is gone.
         """
         changes = self._up_to_date()
         if self._answer is None:
@@ -240,7 +240,7 @@ class ExactInverse(Preconditioner):
     def inverse_blocks(self, pairs: Int) -> Float:
         """Compute the diagonal blocks (m, 2, 2) of H at row pairs (m, 2).  Collective.
 
-        All ranks pass the same pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
+        All ranks pass equal pairs of active global rows.  If both rows of a pair i open, they part by H_ii^-1 lam_i.
         """
         self._add_columns(np.unique(pairs))
         return self._followed.blocks(pairs)

@@ -14,9 +14,9 @@ with the other entries as above.  Springs of inactive rows have the initial comp
 a row that becomes inactive, and receives the gain of a row that becomes active.  An update needs only the columns of
 I; changes of the other stored columns are collected, and applied when there are WAITING_COLUMNS of them.
 
-If a row becomes inactive that alone resists a motion of a body, the row becomes a pin.  A pin stays among the active
-rows, with multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists
-the motion becomes active.
+A row that alone resists a motion of a body becomes a pin, not inactive.  A pin stays among the active rows, with
+multiplier and jump 0, and fixes one of the possible positions of the body, until another row that resists the motion
+becomes active.
 """
 
 import numpy as np
@@ -64,7 +64,7 @@ class FollowedResponse:
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
         """Make room for `more` columns: if necessary, drop the least recently used columns.
 
-        Columns of the rows `needed` stay, even above the capacity; columns of `useful` rows (all rows,) go last.
+        Columns of rows `needed` stay, even above the capacity; rows in the mask `useful` (all rows,) lose columns last.
         """
         capacity = len(self._used)
         if len(self._rows) + more <= capacity:
@@ -95,7 +95,7 @@ class FollowedResponse:
         return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
 
     def product(self, rows: Int, x: Float) -> Float:
-        """Compute Gamma_:rows x (owned rows, k) for global rows (c,) with columns, and x (c, k)."""
+        """Compute Gamma[:, rows] x (owned rows, k) for global `rows` (c,) with columns, and x (c, k)."""
         at, n, columns = self._slot[rows], self._count, len(self._rows)
         waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
         return product_with_some(self._buffer[:, :columns], at, x) - waiting
@@ -124,7 +124,7 @@ class FollowedResponse:
         return distributed_arrays.allreduce_sum(self._comm, blocks)
 
     def add(self, rows: Int, columns: Float) -> None:
-        """Store the columns (owned rows, k) of global rows (k,), after `make_room`."""
+        """Store the columns (owned rows, k) of global rows (k,); call `make_room` first."""
         self._apply_waiting()
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
@@ -138,7 +138,7 @@ class FollowedResponse:
 
         Args:
             rows: (k,) global numbers; these rows and the pins must have columns.
-            signs: (k,) s: 1 for rows that become inactive, -1 for rows that become active, 0 for others.
+            signs: (k,) s: 1 for rows that become inactive, -1 for rows that become active, 0 for rows that stay active.
             gains: (k,) gain of spring compliance.
         """
         is_pin = (rows[:, None] == self.pins).any(axis=1)
@@ -156,7 +156,7 @@ class FollowedResponse:
         return all(self._turn(rows[part], signs[part], gains[part], pivot) for part in parts if len(part))
 
     def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
-        """Update U and columns, like `follow`, for springs on `rows` (k,) that gain compliance `more`.  Collective."""
+        """Update U and columns for springs on `rows` (k,) that gain compliance `more`; see `follow`.  Collective."""
         self._make_room_for_waiting(len(rows))
         columns, values = self._present(rows)
         k, root = len(rows), np.sqrt(np.abs(more))

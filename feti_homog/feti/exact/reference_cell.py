@@ -82,7 +82,7 @@ class AssembledSchur:
             self._solver = DirectSolver(stiffness, "feti_bonded_")
 
     def relieving_displacement(self, forces: Float) -> Float:
-        """Compute u = -Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k).  Collective."""
+        """Compute u = -Z (Z^T S Z)^-1 Z^T f, which balances boundary forces f (n,) or (n, k).  Collective."""
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
         return np.asarray(self._Z @ distributed_arrays.share_columns(self.comm, self._solver.solve, right))
@@ -96,8 +96,7 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
     """Sum Z^T S Z (m, m) over all ranks for Z (n, m); S includes springs, as in `AssembledSchur`.  Collective.
 
     The sum is dense, in Fortran order, if the blocks of all ranks have at least m^2 entries, m is at most
-    `dense_boundary_dofs`, and no option has the prefix `feti_bonded_`; else it is sparse.  Boundary operators must be
-    dense.
+    `dense_boundary_dofs`, and no option begins with `feti_bonded_`; else sparse.  Boundary operators must be dense.
     """
     comm, size, columns = operators.comm, Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
 
@@ -118,7 +117,7 @@ def assembled_stiffness(operators: InterfaceOperators, Z: csr_matrix) -> csr_mat
 
 
 class BodyTies:
-    """Two bonds that tie every fibre to the body around it: the first bond, and the bond farthest from the first."""
+    """Two bonds that tie an inner body to the body around it: the first bond, and the bond farthest from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the two bonds of every pair of bodies.  Collective."""
@@ -175,11 +174,11 @@ class ReferenceCell:
         self.assembled.destroy()
 
     def respond(self, x: Float) -> Float:
-        """Compute Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
+        """Compute the multipliers and gaps Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
         return self._springs.apply(self._without_springs(x))
 
     def columns(self, rows: Int) -> Float:
-        """Compute the columns Gamma[:, rows] (owned rows, k) for global rows (k,), equal on all ranks.  Collective."""
+        """Compute columns Gamma[:, rows] (owned rows, k) for global rows (k,), equal on all ranks.  Collective."""
         # Batches of about COLUMNS_AT_ONCE: a small last batch would cost more than slightly larger batches.
         columns = [np.zeros((len(self.active), 0))]
         for batch in np.array_split(rows, max(round(len(rows) / COLUMNS_AT_ONCE), 1)) if len(rows) else []:
@@ -190,7 +189,7 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Compute max |Gamma r| / `stiffness` (owned rows,) for jumps r of unit rigid-body motions.  Collective."""
+        """Measure rounding: max |Gamma r| / `stiffness` (owned rows,), jumps r of rigid-body motions.  Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         units = (motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)
@@ -225,7 +224,7 @@ class ReferenceCell:
 
 
 def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
-    """Build B_D (local rows, boundary dofs) with B B_D^T = I, which moves one body per bond.  Collective.
+    """Build B_D (local rows, boundary dofs), B B_D^T = I; B_D^T moves one body at every bond.  Collective.
 
     Then columns of Gamma need only forces of the moved bodies.  The inner body moves, unless its forces would lose
     digits because it is more than STIFF_FIBRES times as stiff as the outer body.
@@ -249,7 +248,7 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
 
 
 def stiffness_of_rows(operators: InterfaceOperators) -> Float:
-    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,).  Collective.
+    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,) of every row.  Collective.
 
     D is the diagonal of K, C the compliance of the springs.
     """
@@ -260,7 +259,7 @@ def stiffness_of_rows(operators: InterfaceOperators) -> Float:
 class BondedInverse(Preconditioner):
     """The preconditioner z = H r, with the inverse H of the dual operator from a factored cell with all rows active.
 
-    It serves subdomains across materials, where no bond can break.
+    It serves subdomains of several materials, where no bond can break.
     """
 
     is_exact = True

@@ -1,8 +1,8 @@
 """The present response Gamma' from the reference cell's Gamma, by followed columns of the changed rows C.
 
-Let W be diagonal: s = 1 on rows that became inactive, s = -1 on rows that became active, dC on rows whose springs
-gained the compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a column or an
-answer U of the reference cell becomes the present column or answer
+Let W be diagonal, with s = 1 on rows that became inactive, s = -1 on rows that became active, and dC on other rows,
+where springs gained the compliance dC.  The transforms of `followed_response` give Gamma_:C B = Gamma'_:C W.  So a
+column or an answer U of the reference cell becomes the present column or answer
 
     U' = U_0 - Gamma'_:C W U_C,  where U_0 is U with 0 on rows that became inactive or active.
 """
@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int
 
 
 class ReferenceChanges:
-    """The changed rows C of a reference cell; all of them have followed columns.
+    """The changed rows C of a reference cell; all of C must have followed columns.
 
     Attributes:
         rows: (c,) global numbers of C.
@@ -45,7 +45,7 @@ class ReferenceChanges:
         return response
 
     def refined(self, columns: Float) -> Float:
-        """Compute U' by `present` and one step of iterative refinement.  Collective.
+        """Compute U' like `present`, with one step of iterative refinement.  Collective.
 
         The step removes the rounding of followed columns.  c = B U_C solves (Gamma_CC + D) c = U_C with Gamma of the
         reference cell; D is diagonal.

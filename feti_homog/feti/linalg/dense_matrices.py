@@ -26,8 +26,8 @@ MORE_WORKSPACE = (None, 100, 1000)  # percentages that are added to its estimate
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """Compute the Schur complement (n, n) of a matrix (dofs, dofs) on `rows` (n,), in Fortran order.
 
-    CHOLMOD eliminates the other rows in the `order` (dofs,); the diagonal on `rows` must then be positive.
-    Without `order` or CHOLMOD, or with options under `feti_schur_`, MUMPS eliminates the other rows.
+    CHOLMOD eliminates the other rows in the `order` (dofs,); the diagonal on `rows` must then be positive.  Without
+    `order` or CHOLMOD, or with options under `feti_schur_`, MUMPS eliminates them, and sorts the indices of `matrix`.
 
     Raises:
         LinAlgError: the block of the other rows is not positive definite, or the matrix is not finite.
@@ -78,7 +78,7 @@ class ShiftedFactor:
 
     Attributes:
         factor: L with L L^T = K + D.
-        rows: (n,) rows of K to which K was condensed.
+        rows: (n,) rows that remained when K was condensed.
         D: (n,) positive diagonal of D on `rows`; D is 0 elsewhere.
     """
 
@@ -87,7 +87,7 @@ class ShiftedFactor:
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """Solve K u = f (dofs, k) for u (dofs, k), by (K + D) u = f + D x; x (n, k) are the values of u on `rows`."""
+        """Solve K u = f (dofs, k) by (K + D) u = f + D x; x (n, k) are the values of the solution u on `rows`."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)
@@ -103,7 +103,7 @@ class CondensedMatrix:
         S: (n, n) Schur complement K_bb - K_bi K_ii^-1 K_ib, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
-        factor: factor of K + D; None if it is not kept, or if MUMPS condensed K.
+        factor: CHOLMOD's factor of K, shifted; None if it is not kept, or if MUMPS condensed K.
     """
 
     S: Float
@@ -160,7 +160,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
     """Compute the Cholesky factor L (n, n) of A = L L^T, or L^T if not `lower`.
 
-    The factor overwrites A if A is in Fortran order.  With `clean`, the other triangle is set to 0.
+    The factor overwrites A if A is in Fortran order.  Without `clean`, the other triangle keeps entries of A.
 
     Raises:
         LinAlgError: A is not positive definite, or has entries that are not finite.
@@ -207,7 +207,7 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Overwrite the upper triangle of an SPD matrix A (n, n), in Fortran order, with the inverse.
+    """Overwrite the upper triangle of an SPD matrix A (n, n), in Fortran order, with the triangle of A^-1.
 
     Entries below the diagonal are not read and do not change.
 

@@ -1,4 +1,4 @@
-"""Partial Cholesky factorizations by PETSc's CHOLMOD library, for which PETSc has no interface.
+"""Partial Cholesky factorizations by PETSc's CHOLMOD library; PETSc has no interface for them.
 
 MUMPS orders the eliminated rows without regard to the remaining rows, and is slower if many rows remain.  CHOLMOD
 accepts an order of all rows.  The structures below follow CHOLMOD's manual, and are the same in KNOWN_VERSIONS.
@@ -83,13 +83,13 @@ def is_available() -> bool:
 
 
 class PartialFactor:
-    """The Cholesky factor L of A = L L^T (n, n), with m chosen rows eliminated last.
+    """The Cholesky factor L of A = L L^T (n, n), with rows of A permuted so that m chosen rows come last.
 
     The destructor of this object frees the factor.
     """
 
     def __init__(self, A: csr_matrix, rows: Int, order: Int) -> None:
-        """Factor A (n, n); `rows` (m,) come last, the other rows follow `order` (n,).
+        """Factor A (n, n), and sort its indices in place; `rows` (m,) come last, other rows follow `order` (n,).
 
         Raises:
             LinAlgError: A is not positive definite.
@@ -194,7 +194,7 @@ def _address(values: Array) -> c_void_p:
 
 
 def _array(pointer: int, size: int, kind: Any) -> Array:
-    """Wrap `size` numbers of a C type at `pointer` as an array, without a copy."""
+    """Wrap `size` numbers of the C type `kind` at `pointer` as an array, without a copy."""
     return np.ctypeslib.as_array(ctypes.cast(pointer, POINTER(kind)), (size,))
 
 

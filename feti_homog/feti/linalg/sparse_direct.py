@@ -104,7 +104,7 @@ class DirectSolver:
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
-        """Compute A^-1 B for B (n,) or (n, k)."""
+        """Compute A^-1 B for B (n,) or (n, k); raises like `solve_columns`."""
         X = solve_columns(self._ksp, self._x, self._b, B if B.ndim == 2 else B[:, None])
         X *= self._scale
         return X.reshape(B.shape)

@@ -18,8 +18,8 @@ def sum_of_blocks(
 ) -> csr_matrix:
     """Sum dense blocks (rows (r,), columns (c,), values (r, c)) into a sparse matrix.
 
-    A buffer collects blocks until it holds more entries than `max_buffered_entries`, and more than the sum.  So the
-    memory is at most about twice the sum, and the sum is copied only when its entries have doubled.
+    Blocks wait in a buffer, until it holds more entries than `max_buffered_entries` and than the sum.  So the memory is
+    at most about twice the sum, and the sum is copied only when its entries have doubled.
     """
     total, buffer, buffered_entries = csr_matrix(shape), [], 0
     for rows, columns, values in blocks:
@@ -70,7 +70,7 @@ def assemble_owned_rows(
 
 
 def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
-    """Sum local matrices over ranks; return the local rows (r, n), on one rank `local` itself.  Collective.
+    """Sum local matrices over ranks; return the sum's local rows (r, n), on one rank `local` itself.  Collective.
 
     Args:
         local: (r, n) contribution of this rank; all ranks have the same n columns.
@@ -145,7 +145,7 @@ class DistributedSolver:
     """A solver X = A^-1 B for definite matrices A (n, n) that are summed over ranks.
 
     Up to n = REPLICATED_UNKNOWNS, every rank factors the whole matrix, by CHOLMOD; above, all ranks factor the matrix
-    together, by MUMPS.  Options with the prefix replace these solvers; with `ksp_type` or `pc_type` all ranks solve
+    together, by MUMPS.  Options with the prefix replace these solvers; with `ksp_type` or `pc_type`, ranks solve
     together for any n.
     """
 
@@ -167,7 +167,7 @@ class DistributedSolver:
 
         Raises:
             LinAlgError: A is not positive definite on a rank (rounding may differ between processors); all ranks raise.
-            MemoryError, CaseError: as in `factored`.
+            MemoryError, CaseError, FetiHomogError: as in `factored`.
         """
         self.destroy()
         error = None
@@ -209,7 +209,7 @@ class DistributedSolver:
     def solve(self, B: Float) -> Float:
         """Solve A X = sum of B over ranks; return the local unknowns (u,) or (u, k).  Collective.
 
-        B (u,) or (u, k) is the part of this rank; call `factor` first.
+        B (u,) or (u, k) is the part of this rank.  Call `factor` first; raises like `solve_columns`.
         """
         assert self._ksp is not None, "no matrix is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]

@@ -36,7 +36,7 @@ class SubdomainSize:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
         is_whole_body: whether every shared node has one other sharer, in another body.
-        has_springs: whether the subdomain is an inner body with springs: its S~, see `with_springs.py`, is dense.
+        has_springs: whether the subdomain is an inner body with springs; then S~ (`with_springs`) is dense.
     """
 
     dofs: int
@@ -56,7 +56,7 @@ def choose(
     """Choose the boundary operators of every subdomain.
 
     Returns two lists with a flag for every subdomain: whether it gets dense matrices instead of sparse factors, and
-    whether it is facewise: its soft modes are computed face by face.
+    whether soft modes are computed face by face (facewise).
 
     By default a subdomain with n <= `dense_boundary_dofs` boundary dofs gets dense matrices if the inverse costs less
     than all sparse solves (DENSE_INVERSE_COST n^3 <= dofs x applications), if the subdomain has springs, or if soft
@@ -88,7 +88,7 @@ class DualOperator:
     F is symmetric positive definite: B has full row rank, and K+ is definite.
 
     Attributes:
-        compliance: (owned rows,) diagonal of C.
+        compliance: (owned rows,) compliance of the springs, the diagonal of C.
     """
 
     def __init__(self, boundary: InterfaceOperators, compliance: Float) -> None:
@@ -99,7 +99,7 @@ class DualOperator:
         return self.jump(self.displacement(x)) + distributed_arrays.scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
-        """Compute K+ B^T lam (boundary dofs, k), subtracted in Eq. (34), for lam (owned rows, k).  Collective."""
+        """Compute K+ B^T lam (boundary dofs, k), see Eq. (34), for multipliers lam (owned rows, k).  Collective."""
         return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
@@ -108,22 +108,22 @@ class DualOperator:
 
 
 class InterfaceOperators:
-    """S and S+ on the n boundary dofs of this rank, one subdomain after the other.
+    """Schur complements S and flexibilities S+ of the local subdomains, on n boundary dofs in all.
 
     Attributes:
         dofs: for every local subdomain, (n_s,) numbers of its boundary dofs in the subdomain, ascending.
         offsets: (subdomains + 1,) first boundary dof of every subdomain, and n.
         local_dofs: (n,) numbers of the boundary dofs among all dofs of this rank.
         operators: for every subdomain, S and S+ as dense matrices or by sparse factors.
-        with_springs: for every subdomain, S~ and flexibility of the body with its springs, see `with_springs.py`.
+        with_springs: for every subdomain, stiffness S~ and flexibility of the body with its springs, else S and S+.
         facewise: for every subdomain, whether soft modes are computed face by face.
         B, BT: (local rows, n) constraints, and their transpose.
         body_diagonal: (n,) diagonal of K.
-        diagonal: (n,) stiffness that scales jumps: diagonal of K times `Subdomain.compressible_share`, in series with
+        diagonal: (n,) stiffness for scaling jumps: diagonal of K times `Subdomain.compressible_share`, in series with
             the springs of the body.
         interiors: factored interiors by position of the subdomain, kept by `extend`.
         springs: (owned rows,) compliance of the springs.
-        compliance: (owned rows,) compliance of springs between two cut bodies, which belong to no subdomain; else 0.
+        compliance: (owned rows,) compliance of the springs of no subdomain, between two cut bodies; else 0.
     """
 
     def __init__(
@@ -194,7 +194,7 @@ class InterfaceOperators:
 
     @cached_property
     def of_inner(self) -> Bool:
-        """Return the mask (n,) of boundary dofs in bodies that are not outer; at bonds, only in the inner body."""
+        """Return the mask (n,) of boundary dofs in inner bodies; of two bonded bodies, only the inner one counts."""
         sizes = np.diff(self.offsets)
         of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
@@ -205,11 +205,11 @@ class InterfaceOperators:
         return of_inner
 
     def apply_schur(self, x: Float) -> Float:
-        """Compute S x for x (n,) or (n, k)."""
+        """Compute the forces S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
 
     def apply_with_springs(self, x: Float, which: Sequence[bool] | None = None) -> Float:
-        """Compute S~ x for x (n,) or (n, k), with the stiffness S~ of bodies with springs.
+        """Compute the forces S~ x for x (n,) or (n, k), with the stiffness S~ of bodies with springs.
 
         `which` (subdomains,) selects subdomains; the result is 0 on all other subdomains.
         """
@@ -217,7 +217,7 @@ class InterfaceOperators:
         return self._each([o.apply_schur for o in self.with_springs], x, chosen)
 
     def apply_flexibility(self, x: Float) -> Float:
-        """Compute the boundary part of K+ x for x (n,) or (n, k)."""
+        """Compute the displacements S+ x, the boundary part of K+ x, for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
     def _each(
@@ -232,7 +232,7 @@ class InterfaceOperators:
 
     @cached_property
     def condensed(self) -> one_subdomain.CondensedLoads:
-        """The `CondensedLoads` of all local subdomains together, computed when first read."""
+        """Condense the unit loads of all local subdomains to their boundaries, when first read."""
         v = self._loads
         parts = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])

@@ -1,6 +1,6 @@
 """The boundary operators of one subdomain: Schur complement S and flexibility S+, dense or by sparse factors.
 
-S and S+ are symmetric and stored in one square array, so that a product reads n^2 / 2 numbers.  One partial
+Dense S and S+ are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  One partial
 factorization gives S.  As the dual problem lives on the boundary, the factor is kept only for displacements inside.
 Sparse factors replace dense matrices that would be too large.
 """
@@ -22,7 +22,7 @@ from feti_homog.typing import Float, Int
 
 
 class ExplicitInterfaceOperator:
-    """S and S+ of one subdomain as dense matrices (n, n) on its n boundary dofs.
+    """The Schur complement S and flexibility S+ of one subdomain, dense (n, n), on its n boundary dofs.
 
     With fixing nodes on the boundary, the inverse of S + rho Rf Rf^T (`Subdomain.fixing`) is the boundary part of K+.
 
@@ -89,7 +89,7 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Multiply x by the symmetric matrix of a `diagonal` (n,) and the upper (`lower` 0) or lower (1) triangle.
+        """Multiply x by the symmetric matrix of `diagonal` (n,) and the stored upper (`lower` 0) or lower (1) triangle.
 
         The product goes into `out` if given, and is fastest for x in Fortran order.
         """
@@ -106,7 +106,7 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """Extend displacements x (n, k) to (all dofs, k) by the kept factor; `loads` (v, k) are None without loads."""
+        """Extend displacements x (n, k) to (all dofs, k) by `factor`, under `loads` (v, k); None without loads."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:
@@ -145,7 +145,7 @@ class CondensedLoads:
 
         q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
 
-    In a piece of one material without voids, Q_i = 0.
+    Q_i = 0 unless `Subdomain.loads_inside`.
 
     Attributes:
         boundary: (n, v) q.
@@ -160,7 +160,7 @@ class CondensedLoads:
 
 
 class ImplicitInterfaceOperator:
-    """S and S+ of one subdomain on its n boundary dofs, by sparse factors of K."""
+    """The Schur complement S and flexibility S+ of one subdomain on its n boundary dofs, by sparse factors of K."""
 
     is_dense = False
 
@@ -250,7 +250,7 @@ class Interior:
         return self._Kib.T.tocsr()
 
     def extend(self, x: Float, load: Float | None = None) -> Float:
-        """Compute u_i = -K_ii^-1 (K_ib x + q) for boundary displacements x (n,) or (n, k).
+        """Compute the inner displacements u_i = -K_ii^-1 (K_ib x + q) for boundary displacements x (n,) or (n, k).
 
         `load` is q, (inner dofs,) or (inner dofs, k); 0 if None.
         """
@@ -258,7 +258,7 @@ class Interior:
         return self.solve(-forces if load is None else -forces - load)
 
     def solve(self, forces: Float) -> Float:
-        """Compute K_ii^-1 f for `forces` f (inner dofs,) or (inner dofs, k)."""
+        """Compute inner displacements K_ii^-1 f for `forces` f (inner dofs,) or (inner dofs, k)."""
         return self._solver.solve(forces) if len(self.dofs) else np.zeros(forces.shape)
 
     def reactions(self, x: Float) -> Float:

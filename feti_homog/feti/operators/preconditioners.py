@@ -47,7 +47,7 @@ class Preconditioner(Protocol):
     def soften(self, more: Float) -> None:
         """Add `more` (owned rows,) to the intact spring compliance, from the next `activate` on.
 
-        Raises ValueError if the preconditioner is made for springs of constant compliance.
+        By default raises ValueError: the preconditioner takes constant compliance.
         """
         raise ValueError("springs soften; expected constant compliance, as the preconditioner was set up")
 
@@ -93,11 +93,11 @@ class StiffnessScaled(Preconditioner):
         self.W_inverse = self.W.inverse(active)
 
     def displacement_with_jump(self, g: Float) -> Float:
-        """Compute B_D^T g = D^-1 B^T W^-1 g (boundary dofs, k), with the jumps g on active rows.  Collective."""
+        """Compute B_D^T g = D^-1 B^T W^-1 g (boundary dofs, k), which has the jumps g on active rows.  Collective."""
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """Compute B_D f = W^-1 B D^-1 f (owned rows, k): lam if f = B^T lam for lam on active rows.  Collective."""
+        """Compute multipliers B_D f = W^-1 B D^-1 f (owned rows, k); B^T lam gives lam on active rows.  Collective."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:
@@ -157,7 +157,7 @@ class SpringUpdate:
 
 
 def _factored(block: Float) -> tuple[Float, bool]:
-    """Return the Cholesky factor of C^-1 + X^T H X, for `cho_solve`.  Raises ConvergenceError if it is not definite."""
+    """Return C^-1 + X^T H X = `block` factored for `cho_solve`; raise ConvergenceError if it is not definite."""
     try:
         factor: tuple[Float, bool] = cho_factor(block)
     except LinAlgError as error:
@@ -169,7 +169,7 @@ def _factored(block: Float) -> tuple[Float, bool]:
 
 
 class SpringUpdated(Preconditioner):
-    """A preconditioner H with `SpringUpdate` for the springs of active rows, which may soften."""
+    """A preconditioner H with `SpringUpdate` for the springs of active rows; the springs may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
         """Update H = `inner` with all rows active; arguments and exceptions are as in `SpringUpdate`.  Collective."""

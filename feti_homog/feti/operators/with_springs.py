@@ -1,6 +1,7 @@
 """The protocol of boundary operators, and the operators of a body with springs on its boundary.
 
-At the far ends of the springs, with compliance C = T T^T, the flexibility is S+ + C, and the stiffness is
+The body has the stiffness S and the flexibility S+.  At the far ends of springs with compliance C = T T^T, the
+flexibility is S+ + C, the stiffness
 
     S~ = G - G R (R^T G R)^-1 R^T G,
     G = A - A T (I + T^T A T)^-1 T^T A,  A = S + s R R^T,
@@ -53,7 +54,7 @@ def is_dense(operator: BoundaryOperator) -> TypeGuard[DenseOperator]:
 
 
 class _Softening:
-    """The matrix S~, by products with S.
+    """The stiffness S~ of a body with springs, by products with S.
 
     Attributes:
         kernel: (n, k) orthonormal kernel R of S.
@@ -73,7 +74,7 @@ class _Softening:
         self._root_of_kernel = np.asarray(solve_triangular(root, GR.T, lower=True))
 
     def _relaxed(self, y: Float) -> Float:
-        """Compute G x from y = A x."""
+        """Compute G x from y = A x, with the matrices A and G of this module."""
         along = cho_solve(self._factor, self._T.T @ y)  # T^T G x
         z = y - self._AT @ along
         return np.asarray(z + self._directions @ (along - self._T.T @ z))
