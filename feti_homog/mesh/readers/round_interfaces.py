@@ -1,4 +1,4 @@
-"""Fit circles, ellipses and arcs through middle nodes to the interface edges `pairs` (k, 2) of users' meshes."""
+"""Bend the interface edges `pairs` (k, 2) of users' meshes to circles, to ellipses, or through their middle nodes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -75,10 +75,10 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Replace elliptic interfaces that are not circles by ellipses.
 
-    A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
-    the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
-    of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
-    third edge flips in triangles with two edges on one ellipse. A remark names interfaces that are only within
+    A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE semi-axes of an
+    ellipse, and the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than
+    60 degrees of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in
+    two. The third edge flips in triangles with two edges on one ellipse. A remark lists interfaces that are only within
     NEARLY_ROUND and have no middle nodes.
     """
     nodes = len(mesh.points)
@@ -135,7 +135,7 @@ def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coa
 
 
 def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int32]) -> CoarseMesh:
-    """Add ellipses to the mesh, with the edges (a, 2) on each ellipse."""
+    """Add `curves` to the ellipses of the mesh, and to `arc_edges` the edges (a, 2) on each curve, from `arcs`."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -148,7 +148,7 @@ def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int3
 def _closed_loops(
     mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes, fewest: int
 ) -> Iterator[tuple[Int, Float, Float, list[tuple[Float, Int]]]]:
-    """Yield closed interfaces that are contractible on the torus, off the cell sides.
+    """Yield closed interfaces, off the cell sides and without branches, that are contractible on the torus.
 
     An interface has at least `fewest` edges or, with middle nodes, edge halves.
 
@@ -192,7 +192,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2), images of `places`, onto a circle, side nodes along sides; None if a point cannot move."""
+    """Move nodes (k, 2), at `places` when unwrapped, onto a circle, or along sides; None if a node cannot move."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]

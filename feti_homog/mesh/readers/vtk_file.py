@@ -162,13 +162,13 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """A reader of the lines, words and arrays in a VTK file; binary arrays are big-endian."""
+    """A reader of the lines, words and arrays in a VTK or Medit file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Read the words of the next line, past blank lines and METADATA blocks; empty at the end."""
+        """Read the words of the next line, past blank lines and METADATA blocks; [] at the file end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)
@@ -179,13 +179,13 @@ class Scanner:
         return words
 
     def word(self) -> str:
-        """Read the next word; empty at the file end."""
+        """Read the next word; "" at the file end."""
         match = WORD.search(self.content, self.place)
         self.place = len(self.content) if match is None else match.end()
         return "" if match is None else match[0].decode(errors="replace")
 
     def follows(self, word: str) -> bool:
-        """Return whether the next word, in capitals, is `word`."""
+        """Return whether the next word is `word`, regardless of case; the word stays unread."""
         match = WORD.search(self.content, self.place)
         return match is not None and match[0].upper() == word.encode()
 
@@ -196,7 +196,7 @@ class Scanner:
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Read an array (count,) of the VTK type `name`; MeshError for missing or wrong values."""
+        """Read the next `count` values of the VTK type `name`; MeshError for missing or wrong values."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
@@ -220,6 +220,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError, with the number of the current line of a text file."""
+        """Raise MeshError; in text files, the message begins with the number of the current line."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")

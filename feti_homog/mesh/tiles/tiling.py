@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """The least size of cells with tiles, and the size of tiles.
+    """The least disc count of cells with tiles, and the disc count of a tile.
 
     Attributes:
         least_discs: cells with fewer discs are one tile.
@@ -46,7 +46,7 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """The assignment of all parts of a cell to tiles.
+    """The assignment of bridges, discs and matrix faces to tiles.
 
     Attributes:
         bridges: bridges on tile borders.
@@ -118,7 +118,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
-    """Cut a cell with the outline `lines` into tiles.  Without a tiling, the cell is one tile."""
+    """Cut a cell with the outline `lines` into tiles; without a tiling (None), return the cell as the only tile."""
     if tiles is None:
         return [cell]
     from feti_homog.mesh.tiles import matrix_faces
@@ -159,7 +159,8 @@ class Regions:
     """The regions of a generated cell, which every rank has.
 
     Attributes:
-        width, height, scale, origin: size of the mesh, mesh lengths / lengths in tiles, lower left corner.
+        width, height, origin: size of the mesh, and its lower left corner in the coordinates of the user.
+        scale: mesh lengths / lengths in tiles.
         phases: phase names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
         constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
@@ -186,7 +187,7 @@ class FilledTile:
     Attributes:
         number: index of the tile among all tiles.
         tile, filling: the lines with nodes; the triangles and inner nodes.
-        first: number of the first inner node.
+        first: number of the first inner node in the cell.
     """
 
     number: int
