@@ -19,7 +19,7 @@ LONGEST = 10.0
 
 @dataclass(frozen=True)
 class EllipticArcs(Lines):
-    """Arcs of ellipses, approximated by chords for arc lengths.
+    """Arcs of ellipses, with lengths along chords between samples.
 
     Attributes:
         ellipses: (a,) the ellipse of each arc.

@@ -209,7 +209,7 @@ def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes without a partner, on the side with more nodes, and sides without inner nodes."""
+    """List nodes without a partner, unless their side has fewer nodes, and sides without inner nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))

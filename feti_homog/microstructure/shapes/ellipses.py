@@ -19,7 +19,7 @@ THINNEST = 0.05
 
 @dataclass(frozen=True)
 class Ellipses(ConvexCurves):
-    """k ellipses c + F p with |p| = 1; `centres` c (k, 2), `frames` F (k, 2, 2)."""
+    """k ellipses of points c + F p with |p| = 1; `centres` c (k, 2), `frames` F (k, 2, 2)."""
 
     frames: Float
 
@@ -32,7 +32,7 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """Build ellipses from circles (k, 3) of centre and radius."""
+        """Build ellipses with equal semi-axes from circles (k, 3) of centre and radius."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
@@ -42,7 +42,7 @@ class Ellipses(ConvexCurves):
 
     @property
     def cores(self) -> Float:
-        """The cores (k, 1, 2): the origin."""
+        """The cores (k, 1, 2) of `ConvexCurves`: the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
@@ -52,11 +52,11 @@ class Ellipses(ConvexCurves):
 
     @property
     def extents(self) -> Float:
-        """The extents (k, 2, 2) along the axes, backwards and forwards."""
+        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Return the ellipses with both semi-axes, the columns of F, longer by `thickness` (k,)."""
+        """Return the ellipses with both semi-axes, which the columns of F must be, longer by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -74,24 +74,24 @@ class Ellipses(ConvexCurves):
 
     @property
     def semi_axes(self) -> Float:
-        """The lengths (k, 2) of the semi-axes, if the columns of F are the semi-axes."""
+        """The lengths (k, 2) of the semi-axes, which the columns of F must be."""
         return np.asarray(np.linalg.norm(self.frames, axis=1))
 
     @property
     def perimeters(self) -> Float:
-        """The perimeters (k,) by Ramanujan's second formula, too small by at most 0.04 %."""
+        """The perimeters (k,) by Ramanujan's second formula, too small by at most 0.04 %; see `semi_axes`."""
         a, b = self.semi_axes.T
         h = 3 * ((a - b) / (a + b)) ** 2
         return np.asarray(np.pi * (a + b) * (1 + h / (10 + np.sqrt(4 - h))))
 
     @property
     def angles(self) -> Float:
-        """The angles (k,) from x to the first semi-axis, in degrees."""
+        """The angles (k,) from the x axis to the first column of F, a semi-axis, in degrees."""
         return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
 
     @property
     def longest(self) -> Float:
-        """The longer semi-axes (k,)."""
+        """The longer semi-axis (k,) of each ellipse; see `semi_axes`."""
         return np.asarray(self.semi_axes.max(axis=1))
 
     def points(self, angle: Float) -> Float:
@@ -103,7 +103,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the parameters (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
+        """Return the parameters t (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
@@ -112,10 +112,10 @@ class Ellipses(ConvexCurves):
         return self.parameter(directions(angle))
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`.
+        """Return middles (k,) and half lengths (k,) of the chords that ellipses cut from the coordinate `axis`.
 
-        An ellipse that does not intersect the axis has the half length 0.  The points d = x - c, with a known
-        component v, satisfy d . (F F^T)^-1 d = 1.
+        An ellipse that does not intersect the axis has the half length 0.  The points d = x - c, with a known component
+        v, satisfy d . (F F^T)^-1 d = 1.
         """
         inverse, other = np.linalg.inv(self.squares), 1 - axis
         v = -self.centres[:, other]
@@ -139,16 +139,16 @@ class Ellipses(ConvexCurves):
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, 2) with the outward unit normals n (k, 2)."""
+        """Return the points (k, 2) of the ellipses where the outward unit normals are n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
     def bend(self, normal: Float) -> Float:
-        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) at normals n (k, 2)."""
+        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) where the outward unit normals are n (k, 2)."""
         return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
 
     def normal(self, angle: Float) -> Float:
-        """Return the outward unit normals (k, 2) at parameters (k,)."""
+        """Return the outward unit normals (k, 2) at the parameters t (k,) of `points`."""
         across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
@@ -170,7 +170,7 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
 
 
 class EllipticRows:
-    """The shape of table rows that have semi-axes in place of a radius."""
+    """The shape of table rows with two different semi-axes a and b."""
 
     name, sizes, has_tips = "ellipses", ("a", "b"), True
     columns = MappingProxyType(
@@ -201,7 +201,7 @@ class Discs(ConvexCurves):
 
     @property
     def cores(self) -> Float:
-        """The cores (k, 1, 2): the origin."""
+        """The cores (k, 1, 2) of `ConvexCurves`: the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
@@ -221,7 +221,7 @@ class Discs(ConvexCurves):
 
     @property
     def extents(self) -> Float:
-        """The extents (k, 2, 2) along the axes: the radii."""
+        """The extents (k, 2, 2) from the centres along both axes: the radii."""
         return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
 
     def grown(self, thickness: Float) -> Discs:
@@ -237,7 +237,7 @@ class Discs(ConvexCurves):
         return np.asarray(offsets / self.radii[:, None])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the angles (k,) of vectors d (k, 2), in radians."""
+        """Return the angles (k,) of vectors d (k, 2), in radians: parameters of `points`."""
         return np.arctan2(offsets[:, 1], offsets[:, 0])
 
     def parameter_at(self, angle: Float) -> Float:
@@ -245,11 +245,11 @@ class Discs(ConvexCurves):
         return angle
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`."""
+        """Return middles and half lengths (k,) of the chords that discs cut from the coordinate `axis`; 0 if none."""
         return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
 
     def support(self, normal: Float) -> Float:
-        """Return the radii (k, ...), the supports in all directions."""
+        """Return the supports (k, ...) at unit vectors n (k, ..., 2): the radii."""
         radii = np.expand_dims(self.radii, axis=tuple(range(1, normal.ndim - 1)))
         return np.broadcast_to(radii, normal.shape[:-1])
 

@@ -39,7 +39,7 @@ class ConvexCurves:
         return self._each(lambda array: array[rows])
 
     def at(self, centres: Float) -> Self:
-        """Return the curves at other centres (k, 2)."""
+        """Return the curves moved to other centres (k, 2)."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Self:
@@ -55,11 +55,11 @@ class ConvexCurves:
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Append other curves.  The cores of all curves must have equally many corners."""
+        """Return these curves followed by `others`.  The cores of all curves must have equally many corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
-        """Apply a function, field by field, to this object and other curves."""
+        """Apply a function, field by field, to this object and other curves; return the new curves."""
         curves = (self, *others)
         values = [function(*(getattr(each, field.name) for each in curves)) for field in fields(self)]
         return type(self)(*values)
