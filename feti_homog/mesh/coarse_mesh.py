@@ -15,7 +15,7 @@ HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
-    """Return the mask (k,) of edges with `ends` (k, 2, 2), or of points (k, 1, 2), on a side of [0, `size`]."""
+    """Mark edges with `ends` (k, 2, 2), or points (k, 1, 2), on a side of the rectangle [0, `size`]: mask (k,)."""
     return np.asarray(((ends == 0).all(axis=1) | (ends == size).all(axis=1)).any(axis=1))
 
 
@@ -108,7 +108,7 @@ def areas(points: Float, triangles: Int32) -> Float:
 
 
 def edges(triangles: Int32) -> Int32:
-    """List the directed edges (3m or 4m, 2); row 3t + i, or 4t + i, joins corners i + 1 and i + 2 of element t."""
+    """List the directed edges (3m or 4m, 2) of m elements; row 3t + i or 4t + i joins corners i + 1, i + 2 of t."""
     return np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
 
 
@@ -165,7 +165,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find triangles (b,) with two edges on one circle, and the corner (b,) between both edges, of `nodes` nodes."""
+    """Find triangles (b,) with two edges on one circle, and the corner (b,) between these; `nodes` counts the nodes."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

@@ -148,8 +148,9 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
 def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
     """Return the coating thickness (fibres,), 0 for fibres without a coating.
 
-    `numbers` and `is_fibre` come from `fibre_numbers`; `semi_axes` is (constituents, 2). The thickness is the semi-axis
-    of the coating less that semi-axis of the fibre: NaN if unknown, or if both axes give different thicknesses.
+    `numbers` and `is_fibre` come from `fibre_numbers`; `semi_axes` is (constituents, 2). The thickness is the
+    difference between semi-axes of coating and fibre: NaN without semi-axes, or if both axes give different
+    thicknesses.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1

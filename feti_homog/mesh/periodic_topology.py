@@ -34,7 +34,7 @@ class Torus:
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) mask of void boundaries: one triangle in the whole cell, not on a side without images.
+        at_void: (torus edges,) mask of void edges: one triangle of the whole cell, but not on a side without images.
         is_whole: whether the mesh has all triangles of the cell.
     """
 
@@ -92,7 +92,7 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the end nodes (k, 2) of torus edges in the mask `chosen`: of the left or lower copy on cell sides."""
+        """Return end nodes (k, 2) of torus edges in the mask `chosen`: on cell sides, of the left or lower image."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 
@@ -171,7 +171,7 @@ class Torus:
 
     @cached_property
     def never_part(self) -> Bool:
-        """The mask (classes,) of nodes that stay joined: three or more constituents meet there, or two touch."""
+        """The mask (classes,) of joined nodes, where three or more constituents meet, or two are `touching`."""
         return np.asarray((self.meeting > 2) | self.touching)
 
     @cached_property
@@ -215,7 +215,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """Return the part (m,) of each triangle, for constituents cut at the sides (Fig. 2a, `bodies = "plane"`)."""
+        """Return the part (m,) of each triangle if cell sides cut constituents apart (Fig. 2a, `bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])
@@ -250,7 +250,7 @@ def components(n: int, one: Int, other: Int) -> Int:
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Return the distinct `numbers` (k,), ascending, and the index of every entry.  All numbers are below `size`."""
+    """Return the distinct `numbers` (k,), ascending, and the index of every entry in them.  All are below `size`."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))

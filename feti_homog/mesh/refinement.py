@@ -196,7 +196,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Concatenate refined meshes that have one lattice and no common nodes, and shift node numbers."""
+    """Concatenate refined meshes that have one lattice and no common nodes; shift node and class numbers."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(

@@ -145,7 +145,7 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: Int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the joined subdomains of each rank, in rank order, without subdomains for a rank that has none.
+    """Yield the joined subdomains of each rank, in rank order; the mesh of a rank without subdomains is empty.
 
     `subdomain` (m,) has the subdomain of each triangle, and `pinned` the keys of the pinned classes.
     """

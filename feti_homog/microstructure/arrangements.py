@@ -34,7 +34,7 @@ class Arrangement:
     """N separate fibres and voids on the torus with periods `width` and `height`.
 
     Attributes:
-        outlines: N outlines without rings (coatings, hollow walls). Fibre k + 1 has the index k; voids follow.
+        outlines: N outlines without rings: coatings, walls of hollow fibres. Fibre k + 1 has the index k; voids follow.
         phase: (N,) phases of the outlines.
         coating: (N,) thickness of the rings around the outlines, 0 without a ring.
         is_hollow: (N,) mask of voids in hollow fibres; their rings have the fibre phase, other rings are coatings.

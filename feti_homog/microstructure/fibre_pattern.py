@@ -53,7 +53,7 @@ class FibrePattern:
 
     @property
     def fibre_fraction(self) -> float:
-        """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
+        """The area fraction of the discs with centres in the rectangle: sum_i pi R_i^2 / area.
 
         For a window the value is unbiased: on average, these discs cover as much outside as other discs cover inside.
         """

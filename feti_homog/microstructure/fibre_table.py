@@ -1,4 +1,4 @@
-"""Read a table of fibres, such as measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
+"""Read a fibre table, for example measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
 
 from __future__ import annotations
 

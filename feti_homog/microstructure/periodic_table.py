@@ -174,7 +174,7 @@ def fibre_rows(table: FibreTable, window: str) -> Int:
 
 
 def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:
-    """Return the centres (k, 2) in the table of the periodic images `centres` (k, 2), plus moves in a cut window.
+    """Return, for periodic images `centres` (k, 2), the centres that the table lists, plus moves in a cut window.
 
     The images belong to the table indices `rows` (k,), by default to `fibre_rows`.
     """
@@ -189,7 +189,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows without an earlier image, and the faults of images; all rows if `is_cut`."""
+    """Return the mask (N,) of rows without an earlier image, all True if `is_cut`, and faults of images and places."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])

@@ -117,7 +117,7 @@ def match_distance(pattern: FibrePattern, wanted: Float) -> float:
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:
-    """Move the fibres of a periodic pattern to reduce `match_distance` to the target `wanted`.
+    """Move the fibres of a periodic pattern to reduce the `match_distance` from the target `wanted`.
 
     A trial move takes a random fibre to a random position around its centre, near or far. The move is accepted if the
     fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. The search ends
@@ -172,7 +172,7 @@ def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
 
 
 def _mean_square(distances: Float, wanted: Float) -> float:
-    """Return the mean square difference between distances, sorted by column, and the sorted target, (N, SHELLS)."""
+    """Return the mean square difference between `distances` (N, SHELLS), sorted by column, and the sorted `wanted`."""
     difference = np.sort(distances, axis=0) - wanted
     return float(np.cumsum(difference * difference)[-1]) / wanted.size
 

@@ -119,7 +119,7 @@ INSTEAD = {"radius": "a"}
 
 @dataclass(frozen=True)
 class SourceColumn:
-    """A column of a file: its place in each row, the name in `NUMBERS` or phase, and the conversion of numbers."""
+    """A column of a file: place in each row, name (a key of `NUMBERS` or "phase"), conversion of numbers."""
 
     place: int
     name: str

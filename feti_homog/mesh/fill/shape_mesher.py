@@ -91,7 +91,7 @@ def filled(gmsh: ModuleType, size: Float, field: SizeField, key: str, advice: st
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces in the cell, in one group for each phase; return the precedence by surface tag."""
+    """Add the surfaces of matrix and fibres to gmsh, in one group for each phase; return their precedences by tag."""
     occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
     assert isinstance(curves, convex_sums.ConvexSums)
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))

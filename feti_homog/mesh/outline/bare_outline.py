@@ -111,7 +111,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield nodes (n, 2) and curves of both sides along `axis`, which match; MeshError for too many nodes."""
+        """Yield nodes (n, 2) and curves of both sides along `axis`, with matching nodes; MeshError for too many."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)
@@ -140,7 +140,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Return the arcs from `outline.arcs_within`, starts (a, 2), and the mask (a,) of starts off `border` (b, 2)."""
+    """Divide curves by `arcs_within`; also return first points (a, 2), and the mask (a,) of points not in `border`."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

@@ -23,7 +23,7 @@ class EllipticArcs(Lines):
 
     Attributes:
         ellipses: (a,) the ellipse of each arc.
-        angle, way: (a, k) parameters of samples on each arc, and arc lengths from the start to the samples.
+        angle, way: (a, k) parameters of k samples on each arc, and arc lengths from the start to the samples.
     """
 
     ellipses: Ellipses

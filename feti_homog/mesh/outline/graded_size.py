@@ -113,7 +113,7 @@ class MeshSizes:
 class SizeField:
     """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a smaller graded size.
 
-    Source k, with the length h_k at x_k, is one of the NEAREST sources next to x, and within `largest` / MAX_GROWTH.
+    Source k at x_k has the length h_k and growth g_k; the NEAREST sources within `largest` / MAX_GROWTH of x count.
 
     Attributes:
         largest: largest size.

@@ -1,4 +1,4 @@
-"""Build the cell lines with nodes from images, vertices, arcs and pieces of sides."""
+"""Build the cell lines: images of outlines, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ def crossings(curves: Conics, axis: int, size: Float) -> Float:
 
 
 def on_side(places: Float, axis: int, level: float) -> Float:
-    """Return the points (k, 2) with coordinates `places` (k,) along `axis`, on the side where the other is `level`."""
+    """Return the points (k, 2) of a side: coordinates `places` (k,) along `axis`, and `level` along the other axis."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points

@@ -44,7 +44,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
 
 
 def not_finite(mesh: RawMesh) -> list[str]:
-    """List nodes with coordinates that are not finite; else report an extreme size, or one coordinate for all nodes."""
+    """List nodes with coordinates that are not finite; else report a cell that is flat, too small or too large."""
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
@@ -172,7 +172,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def _nearest(plane: Float, places: Float, free: Float) -> str:
-    """Write how far `places` (k, 2) are from nodes `free` (m, 2); propose to snap if pairs are unambiguous."""
+    """Write how far `places` (k, 2) are from `free` nodes (m, 2) of `plane` (n, 2); propose to snap clear pairs."""
     away, nearest = cKDTree(free).query(places)
     distance, step = float(away.max(initial=0.0)), cKDTree(plane).query(free[nearest], 2)[0][:, 1].min(initial=np.inf)
     is_clear = 2 * distance < step and len(np.unique(nearest)) == len(nearest)

@@ -218,7 +218,7 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select group names, from `phase_of` by `_key`; skip other names and repetitions."""
+    """Return the phases that select group names: `phase_of` has the phase by `_key`; other names are skipped."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 

@@ -192,7 +192,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move nodes (k, 2), at `places` when unwrapped, onto a circle, or along sides; None if a node cannot move."""
+    """Move nodes (k, 2), unwrapped at `places`, onto a circle, side nodes along their side; None if one cannot move."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]

@@ -173,7 +173,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,), in radians.
 
-    A disc without half-lines has the label `alone` (n,), others (-1) the `label` (h,) of the next half-line clockwise.
+    Discs have the label `alone` (n,) or, if it is -1, the `label` (h,) of the next half-line clockwise.
     """
     order = np.lexsort((lines.angle, lines.node))
     node, line_angle = lines.node[order], lines.angle[order]

@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of equal-area discs: A + P r + pi r^2 (Steiner), core area A, perimeter P, r^2 = |det F|."""
+        """The radii (k,) of discs with the area A + P r + pi r^2 (Steiner): core area A, perimeter P, r^2 = |det F|."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -142,7 +142,7 @@ class PolygonalRows:
             yield given & (np.nan_to_num(rows[name]) > 0), f"has sides and {name}; give one"
 
     def outlines(self, rows: Columns, centres: Float) -> ConvexSums:
-        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
+        """Build rounded polygons about `centres` (k, 2) from table rows (k,) with this shape."""
         sides, radius = np.maximum(rows["sides"].astype(np.intp), SIDES[0]), rows["radius"]
         rounding = rows["corner"] * radius * np.cos(np.pi / sides)
         # The centres of the rounding circles are the corners of the core.

@@ -1,4 +1,4 @@
-"""Represent discs, and ellipses as affine images of the unit circle: points, tangents, curvature, distances."""
+"""Represent discs and ellipses, affine images of the unit circle: points, tangents, curvature, distances."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Build ellipses with semi-axes a, b (k,); a has the direction `angle` (k,), in degrees."""
+        """Build ellipses about `centres` (k, 2) with semi-axes a, b (k,); a has the direction `angle` (k,), degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
@@ -189,7 +189,7 @@ class EllipticRows:
         yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
 
     def outlines(self, rows: Columns, centres: Float) -> Ellipses:
-        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
+        """Build ellipses about `centres` (k, 2) from table rows (k,) with this shape."""
         return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])
 
 
@@ -254,13 +254,13 @@ class Discs(ConvexCurves):
         return np.broadcast_to(radii, normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Separate pairs along the vectors between centres, or along x for zero vectors; see `ConvexSums.parting`."""
+        """Return directions between centres, or x if centres coincide, and radius sums; see `ConvexSums.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]
 
     def distances(self, offsets: Float) -> Float:
-        """Return the distances (n, k) between circles and points at vectors (n, k, 2) from the centres."""
+        """Return the distances (n, k) between circles and points at `offsets` (n, k, 2) from the centres."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))
 
 
