@@ -34,7 +34,7 @@ class Torus:
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) mask of void edges: one triangle of the whole cell, but not on a side without images.
+        at_void: (torus edges,) mask of edges at voids: one triangle in the cell, but on no side without images.
         is_whole: whether the mesh has all triangles of the cell.
     """
 
@@ -244,7 +244,7 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 
 
 def components(n: int, one: Int, other: Int) -> Int:
-    """Label the n vertices of a graph by connected component; vertex one[k] (k,) has an edge to other[k] (k,)."""
+    """Label the n vertices of a graph by connected component; edges join the vertices `one` (k,) and `other` (k,)."""
     graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 

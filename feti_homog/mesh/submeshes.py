@@ -119,7 +119,7 @@ class SubmeshesOfRank:
 
     Attributes:
         whole: all triangles, or pixels (t, 4), of the rank as one submesh.
-        member: (t,) subdomain of each triangle or pixel, counted on this rank.
+        member: (t,) subdomain of each triangle or pixel, numbered from 0 on this rank.
         index, body, phase: attributes of each subdomain, as in `Submesh`.
     """
 
@@ -279,7 +279,7 @@ def joined_meshes(meshes: list[Submesh]) -> Submesh:
 
 
 def _all(parts: Sequence[object], name: str) -> Array:
-    """Concatenate the arrays with the attribute name `name` of all parts."""
+    """Concatenate the arrays in the attribute `name` of all parts."""
     return np.concatenate([getattr(part, name) for part in parts])
 
 

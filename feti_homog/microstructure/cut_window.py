@@ -23,10 +23,10 @@ def moves(outlines: Outlines, size: Float) -> Float:
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2. Gaps across the border become at
     least the smallest gap inside the window, clipped to the range LEAST_GAP to MOST_GAP; gaps inside stay at least as
     large as this gap or, if they are smaller, do not shrink. Gaps are relative to the sum of the radii. Each step
-    replaces the constraints |v| >= r on vectors v between centres by n . v >= r, with the present directions n; since
-    n . v <= |v|, the solution satisfies the constraints. Outlines other than discs have the radii of equal-area discs;
-    n is the direction of the largest gap n . v - r, where r is the sum of both supports along n.  Raises MeshError if
-    the torus has no room for such moves, or if they do not settle in MAX_STEPS steps.
+    replaces the constraints |v| >= r, with the vector v between two centres and r the sum of radii and gap, by
+    n . v >= r, with the present direction n; since n . v <= |v|, the solution satisfies the constraints. For outlines
+    other than discs, n is the direction of the largest gap, and r the sum of gap and both supports along n.  Raises
+    MeshError if the torus has no room for such moves, or if they do not settle in MAX_STEPS steps.
     """
     centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
     reach, unit = 3 * float(outlines.longest.max()), float(radii.mean())

@@ -137,7 +137,7 @@ def _bare(word: str) -> str:
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Recognize columns by the names `known`, or by names in OTHERS, in any case.  Returns columns and unread names."""
+    """Recognize columns by names in `known` or OTHERS; capitals do not matter.  Returns columns and unread names."""
     bare = list(map(_bare, words))
     values: dict[str, Callable[[float], float]] = {}
     if not AXES_OF_PICTURES.isdisjoint(bare):

@@ -25,7 +25,7 @@ from feti_homog.typing import Bool, Float, Int32
 
 
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
-    """Mesh the regions of an image within smooth outlines; `phase` (rows, columns) numbers the names `phases`.
+    """Mesh the regions of an image within smooth outlines; `phase` (rows, columns) indexes `phases`.
 
     A Gaussian filter, with a standard deviation of one pixel, smooths the mask from `_every_other`; splines follow the
     contour that encloses the area of the mask.

@@ -54,7 +54,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List faults: pixels separated by voids, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
+    """List faults: the first part that voids cut off, and voids at sides with tractions; `is_solid` (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     part = components(len(solid), *Torus.of(mesh).sides[:2])
     faults, sizes = [], np.bincount(part)

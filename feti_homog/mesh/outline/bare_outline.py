@@ -1,4 +1,4 @@
-"""Cut the lines of a cell with discs or ellipses at crossings; all ranks then place nodes on the lines."""
+"""Cut the outlines and sides of a cell, with discs or ellipses, into lines; all ranks then place nodes on the lines."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Divide curves by `arcs_within`; also return first points (a, 2), and the mask (a,) of points not in `border`."""
+    """Cut curves by `arcs_within`; also return the arc starts (a, 2), and the mask (a,) of starts off `border`."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

@@ -130,7 +130,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into its sections, by name and without delimiting lines; skip OTHERS.  Raises MeshError."""
+    """Split a file into its sections: name -> text between the first and last line; skip OTHERS.  Raises MeshError."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")

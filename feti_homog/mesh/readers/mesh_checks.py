@@ -141,7 +141,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie on inner edges with a single triangle.
 
-    `plane` (n, 2) are positions in [0, `size`], exact on sides; too many candidates give only a count of the edges.
+    `plane` (n, 2) are positions in [0, `size`], exact on sides; with too many candidates, one fault counts the edges.
     """
     single = mesh.border
     inner = single[~on_sides(plane[single], size)]

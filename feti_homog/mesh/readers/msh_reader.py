@@ -135,10 +135,10 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median of all outer nodes within `tolerance`, relative to the width, of the outermost node. Two
+    Outer nodes within `tolerance`, relative to the width, of the outermost node move to a side at their median. Two
     nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
     move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
-    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change; later checks report these
+    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: later checks report such
     nodes.
     """
     plane = raw.points[:, :2].copy()
@@ -218,7 +218,7 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the phases that select group names: `phase_of` has the phase by `_key`; other names are skipped."""
+    """Return the phases of group names, once each: `phase_of` maps `_key` to the phase; other names have none."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 

@@ -130,7 +130,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Assemble one or more blocks of elements into one mesh of all corner nodes in use.
+    """Assemble one or more blocks of elements into one mesh; the nodes are the corner nodes in use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
@@ -177,8 +177,8 @@ def assembled(
 def in_triangles(corners: Int, points: Float) -> Int:
     """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
-    Diagonals join nodes at an even number of sides from the lowest node of connected quadrilaterals, so that diagonals
-    alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal is used if its smaller
+    Diagonals join nodes that are an even number of sides away from the lowest node of connected quadrilaterals, so that
+    they alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal is used if its smaller
     triangle is MUCH_LARGER times larger or, where even and odd nodes do not alternate, just larger.  The cut depends on
     positions, not on numbers.
     """

@@ -135,7 +135,7 @@ def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coa
 
 
 def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int32]) -> CoarseMesh:
-    """Add `curves` to the ellipses of the mesh, and to `arc_edges` the edges (a, 2) on each curve, from `arcs`."""
+    """Add the ellipses `curves` to the mesh, and the edges `arcs`, an array (a, 2) for each ellipse."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -154,8 +154,8 @@ def _closed_loops(
 
     Yields:
         Node classes (k,) in order, unwrapped positions (k, 2) of the classes, unwrapped positions of corner and middle
-            nodes in order, and for each image in the plane its distance (2,) to the unwrapped positions and its
-            interface edges.
+            nodes in order, and for each image in the plane the shift (2,) to the unwrapped positions and the interface
+            edges.
     """
     if len(pairs) == 0:
         return

@@ -102,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Yield name, values and width of arrays for `length` points or cells; skip colour tables.  Raises MeshError."""
+    """Yield name, values and width of the arrays in a section for `length` points or cells.  Raises MeshError."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):

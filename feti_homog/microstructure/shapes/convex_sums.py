@@ -40,7 +40,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def longest(self) -> Float:
-        """Upper bounds (k,) on the distances between points and centres."""
+        """Upper bounds (k,) on the distances from the centres to the points of the outlines."""
         core = np.linalg.norm(self.cores, axis=2).max(axis=1)
         return np.asarray(core + np.linalg.norm(self.frames, axis=1).max(axis=1))
 

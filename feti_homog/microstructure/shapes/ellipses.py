@@ -56,7 +56,7 @@ class Ellipses(ConvexCurves):
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Return the ellipses with both semi-axes, which the columns of F must be, longer by `thickness` (k,)."""
+        """Return the ellipses with both semi-axes longer by `thickness` (k,); the columns of F must be semi-axes."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -74,7 +74,7 @@ class Ellipses(ConvexCurves):
 
     @property
     def semi_axes(self) -> Float:
-        """The lengths (k, 2) of the semi-axes, which the columns of F must be."""
+        """The lengths (k, 2) of the columns of F, which must be semi-axes."""
         return np.asarray(np.linalg.norm(self.frames, axis=1))
 
     @property

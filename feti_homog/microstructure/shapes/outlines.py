@@ -26,7 +26,7 @@ class ConvexCurves:
         cores: (k, m, 2) corners of the hull V about the centres; the origin for outlines without a core.
         frames: (k, 2, 2) frames F.
         radii: (k,) radii of equal-area discs.
-        longest: (k,) upper bounds on the distances between points and centres.
+        longest: (k,) upper bounds on the distances from the centres to the points of the curves.
         extents: (k, 2, 2) extents from the centre along the two axes, backwards and forwards.
     """
 
@@ -66,7 +66,7 @@ class ConvexCurves:
 
 
 class ColumnRange(NamedTuple):
-    """The numbers in a table column: value of an empty cell, and lower bounds, inclusive and exclusive."""
+    """The numbers in a table column: value of an `empty` cell, inclusive bound `least`, exclusive bound `above`."""
 
     empty: float
     least: float = -np.inf
