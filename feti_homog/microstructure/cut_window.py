@@ -1,4 +1,4 @@
-"""Make a window of a micrograph periodic: move fibres apart that overlap across the border."""
+"""Make a window of a micrograph periodic: move apart the fibres that overlap across the border."""
 
 import numpy as np
 from scipy.optimize import nnls

@@ -58,7 +58,7 @@ class FibreTable:
 
     @cached_property
     def outlines(self) -> Outlines:
-        """The N outlines without coatings, in the unit of the table, for tables without faults."""
+        """The N outlines in the unit of the table, coatings excluded; the table must have no faults."""
         return outlines_of(self.columns)
 
     @property

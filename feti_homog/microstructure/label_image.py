@@ -26,8 +26,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is too large or no image of whole numbers, or its numbers differ from `labels`, one per
-            line.
+        CaseError: the file is too large or no image of whole numbers, or its numbers are not the keys of `labels`.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)
@@ -58,7 +57,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
 def read_image(path: Path, is_grey: bool = False) -> Array:
     """Return the pixels (rows, columns) of an image file, the upper row first; with `is_grey`, as grey values.
 
-    A separate process decodes the file, because decoders may crash.
+    A separate process with limited memory decodes the file.
 
     Raises:
         CaseError: the file is damaged, too large, not a single image, or, unless `is_grey`, not of whole numbers.

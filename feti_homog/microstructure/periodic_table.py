@@ -168,7 +168,7 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """Return the table indices (fibres,) of the fibres in the cell, without voids or images."""
+    """Return the table indices (fibres,) of the fibres in the cell; voids and repeated images are left out."""
     is_first, _ = _without_images(table, table.places, table.size, window == "cut")
     return np.flatnonzero(is_first & ~table.is_void)
 

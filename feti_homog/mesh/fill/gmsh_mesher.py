@@ -28,9 +28,9 @@ def begin(
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh of a generated cell.
 
-    Round and elliptic fibres give an `UnmeshedCell` with lines without nodes; a table with polygons gives the mesh. The
-    element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before the
-    final scaling, so that cells of one shape have the same mesh at all sizes.
+    Round and elliptic fibres give an `UnmeshedCell`, whose lines have no nodes yet; a table with polygons gives the
+    mesh. The element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1
+    before the final scaling, so that cells of one shape have the same mesh at all sizes.
 
     Args:
         listed: the arrangement of a table; None for other cells, which this function arranges.

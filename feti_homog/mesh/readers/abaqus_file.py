@@ -42,7 +42,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other elements.
+        MeshError: the file is damaged, or has unusable elements.
     """
     text = input_files.read(path).decode("utf-8-sig", "replace")
     content = _Content(budget=max(MOST_MEMBERS, len(text)))

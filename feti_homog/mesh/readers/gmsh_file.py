@@ -81,7 +81,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals and
+        MeshError: the file is damaged or in another format, or has elements that are no triangles, quadrilaterals or
             lines.
     """
     data = input_files.read(path)
@@ -190,7 +190,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: numbers repeat; nodes or triangles are missing; DEBONDED has no lines; other element types occur.
+        MeshError: numbers repeat; nodes or triangles are missing; DEBONDED has no lines; unusable element types occur.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])

@@ -180,7 +180,7 @@ def _nearest(plane: Float, places: Float, free: Float) -> str:
 
 
 def _snap(distance: float, plane: Float) -> str:
-    """Write the advice to snap nodes, with a tolerance for moves by `distance` in the mesh `plane` (n, 2)."""
+    """Write the advice to snap nodes, with a tolerance 10 % above `distance` / width of the mesh `plane` (n, 2)."""
     return f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / np.ptp(plane[:, 0]):.2g}'
 
 

@@ -234,7 +234,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
 
 
 def _distance(ellipse: Ellipses, chain: Float) -> float:
-    """Return the largest distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps > 60 degrees."""
+    """Return the largest distance of a closed chain (k, 2) from an ellipse in semi-axes; inf for steps > 60 degrees."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

@@ -82,7 +82,7 @@ def mesh_of(grid: Grid) -> RawMesh:
     1 on initially debonded lines.  Other lines form a curve for each number or, with `phase`, a single curve `line`.
 
     Raises:
-        MeshError: the grid has other cells or no phases.
+        MeshError: the grid has unusable cells or no phases.
     """
     # Pixels, and polygons of three or four nodes, are triangles and quadrilaterals.
     counts, types, nodes, data = grid.counts, grid.types.copy(), grid.nodes.copy(), grid.data

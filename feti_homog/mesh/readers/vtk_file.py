@@ -50,7 +50,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has unusable cells or no phases.
     """
     file = Scanner(input_files.read(path))
     if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
@@ -130,7 +130,7 @@ def load_medit(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells.
+        MeshError: the file is damaged, or has unusable cells.
     """
     file = Scanner(re.sub(rb"#[^\n]*", b"", input_files.read(path)))
     if file.word() != "MeshVersionFormatted":

@@ -34,7 +34,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has unusable cells or no phases.
     """
     content = input_files.read(path)
     size, start, stop, appended = len(content), content.find(b"<AppendedData"), content.rfind(b"</AppendedData>"), b""

@@ -67,7 +67,7 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
 
 
 def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
-    """Tile a large cell with round fibres; None for other cells, or if bridges do not divide the matrix.
+    """Tile a large cell with round fibres; None for other cells, collinear centres, or too few bridges.
 
     `largest` is the element size; `marks` become nodes, which bridges avoid.
     """
@@ -243,7 +243,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Make the torus of filled tiles without triangles in voids; also return the tile (m,) of each triangle.
+    """Make the torus of filled tiles, except for triangles in voids; also return the tile (m,) of each triangle.
 
     `all_nodes` is the node count in the cell.
     """
