@@ -89,7 +89,7 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def fibre_frames(torus: Torus) -> Float:
-    """Return the frame F (constituents, 2, 2) of each fibre's outer ellipse: points c + F p, |p| = 1, centre c.
+    """Return the frame F (constituents, 2, 2) of each fibre's outer ellipse, with centre c and points c + F p, |p| = 1.
 
     The frame is NaN for the matrix, and for fibres with a boundary that is not on concentric ellipses.
     """

@@ -191,7 +191,7 @@ def pinned_classes(torus: Torus) -> Int:
     """Return the keys of the pinned classes: one in a periodic cell, all on displaced sides, none with tractions.
 
     The one class, Eq. (15), lies inside the matrix if possible, nearest to a corner. On an interface, it would join
-    both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts the fluctuation.
+    both faces; in a fibre, it would hold a fibre without intact bonds.  Its choice only shifts the fluctuation.
     """
     if torus.mesh.boundary != "periodic":
         nodes = on_sides(torus.mesh.points[:, None], torus.mesh.period)

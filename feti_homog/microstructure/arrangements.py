@@ -65,7 +65,7 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Arrange discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
+        """Make the arrangement of discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 

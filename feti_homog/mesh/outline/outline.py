@@ -56,7 +56,7 @@ class Outline:
 
     @property
     def is_coating(self) -> Bool:
-        """The mask (k,) of circles that surround a coating."""
+        """The mask (k,) of the outer circles of rings: of coatings, and of walls of hollow fibres."""
         return np.isin(np.arange(len(self.around)), self.around)
 
 

@@ -172,7 +172,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def _nearest(plane: Float, places: Float, free: Float) -> str:
-    """Write how far `places` (k, 2) are from `free` nodes (m, 2) of `plane` (n, 2); propose to snap clear pairs."""
+    """Write how far `places` (k, 2) are from `free` nodes (m, 2); propose "snap" if each has a near node of its own."""
     away, nearest = cKDTree(free).query(places)
     distance, step = float(away.max(initial=0.0)), cKDTree(plane).query(free[nearest], 2)[0][:, 1].min(initial=np.inf)
     is_clear = 2 * distance < step and len(np.unique(nearest)) == len(nearest)

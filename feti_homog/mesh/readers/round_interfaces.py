@@ -35,8 +35,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it cannot
-    flip, the circle stays a polygon, as do other interfaces.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If this edge
+    cannot flip, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
@@ -214,8 +214,8 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The conic d.A.d + b.d = 1 of least squares, with d from the mean, is |F^-1 (d - c)| = 1 for the centre c and the
-    frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
+    The conic d.A.d + b.d = 1 of least squares, for offsets d from the mean, is |F^-1 (d - c)| = 1 with the centre c and
+    the frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -234,7 +234,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
 
 
 def _distance(ellipse: Ellipses, chain: Float) -> float:
-    """Return the largest distance of a closed chain (k, 2) from an ellipse in semi-axes; inf for steps > 60 degrees."""
+    """Return the largest distance of a closed chain (k, 2) from an ellipse in semi-axes; inf for steps over 60 deg."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

@@ -190,7 +190,7 @@ class Scanner:
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Convert a word into a number of values; MeshError for any other word."""
+        """Convert a word into a count; MeshError unless it is a whole number of at most 15 digits."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)

@@ -128,7 +128,7 @@ class PolygonalRows:
     columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
-        """Return the mask (N,) of rows with sides."""
+        """Return the mask (N,) of rows whose `sides` are not 0."""
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:

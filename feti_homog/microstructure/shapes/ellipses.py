@@ -95,11 +95,11 @@ class Ellipses(ConvexCurves):
         return np.asarray(self.semi_axes.max(axis=1))
 
     def points(self, angle: Float) -> Float:
-        """Return the points (k, 2) c + F (cos t, sin t) at parameters t (k,)."""
+        """Return the points c + F (cos t, sin t) (k, 2) of the ellipses at parameters t (k,)."""
         return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
 
     def unit(self, offsets: Float) -> Float:
-        """Map vectors d (k, 2) to F^-1 d (k, 2), where the ellipses are unit circles."""
+        """Map vectors d (k, 2) to coordinates F^-1 d (k, 2) in which the ellipses are unit circles."""
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
@@ -134,7 +134,7 @@ class Ellipses(ConvexCurves):
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return approximate distances ||F^-1 d| - 1| sqrt|det F| (n, k) of points at d (n, k, 2) from the centres."""
+        """Return distances (n, k) of points at d (n, k, 2) from the centres, about ||F^-1 d| - 1| sqrt|det F|."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
@@ -206,7 +206,7 @@ class Discs(ConvexCurves):
 
     @property
     def circles(self) -> Float:
-        """The centres and radii (k, 3)."""
+        """The centres and radii (k, 3) of the discs."""
         return np.column_stack([self.centres, self.radii])
 
     @property
@@ -216,7 +216,7 @@ class Discs(ConvexCurves):
 
     @property
     def longest(self) -> Float:
-        """The radii (k,), which bound the distances between points and centres."""
+        """The radii (k,), as bounds on the distances from the centres to the points."""
         return self.radii
 
     @property
@@ -229,11 +229,11 @@ class Discs(ConvexCurves):
         return replace(self, radii=self.radii + thickness)
 
     def points(self, angle: Float) -> Float:
-        """Return the points (k, 2) at parameters (k,), which are angles in radians."""
+        """Return the points (k, 2) of the circles at angles (k,) in radians."""
         return on_circle(self.circles, angle)
 
     def unit(self, offsets: Float) -> Float:
-        """Map vectors d (k, 2) to d / r (k, 2), where the discs are unit discs."""
+        """Map vectors d (k, 2) to coordinates d / r (k, 2) in which the discs are unit discs."""
         return np.asarray(offsets / self.radii[:, None])
 
     def parameter(self, offsets: Float) -> Float:
@@ -241,7 +241,7 @@ class Discs(ConvexCurves):
         return np.arctan2(offsets[:, 1], offsets[:, 0])
 
     def parameter_at(self, angle: Float) -> Float:
-        """Return the parameters (k,) at angles (k,), which are the angles themselves."""
+        """Return the parameters (k,) at polar angles (k,): the angles themselves, in radians."""
         return angle
 
     def chord(self, axis: int) -> tuple[Float, Float]:
