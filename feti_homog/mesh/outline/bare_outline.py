@@ -90,7 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges, `stations`, and on sides; MeshError for too many nodes."""
+        """Make the outline: nodes `stations` on arcs and bridges, matching nodes on sides; MeshError for too many."""
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
         parts = [*self._sides(0), *self._sides(1)]
