@@ -20,7 +20,7 @@ def arrange(cell: cell_section.Cell) -> Arrangement:
     fractions `cell.fractions`; `periodic_table.table_arrangement` arranges tables.
 
     Raises:
-        MeshError: discs touch or are too many, the search for an arrangement fails, or the table is faulty.
+        MeshError: discs touch, are too many or too dense, no arrangement is found, or the table is faulty.
     """
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)
@@ -45,10 +45,11 @@ def random_arrangement(
     """Place discs at random on the unit torus; every machine finds the same discs.
 
     Fibre radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, scaled to the phase fractions; voids have one
-    radius. Gaps between discs, with coatings and images, are at least `min_gap` mean fibre diameters. A descent from
+    radius. Discs with coatings keep gaps of at least `min_gap` mean fibre diameters, also to images. A descent from
     random centres x_i reduces the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 to zero; R_i includes the
     coating and half the gap. After `max_steps` (default: `random_fibres.MAX_STEPS`), the descent restarts, in up to
-    `max_attempts` attempts (default: 10 for few discs, 3 for many). Finally, `clear_shift` moves the arrangement.
+    `max_attempts` attempts (default: 10 for few discs, 3 for many). Finally, `clear_shift` moves the cell sides away
+    from tangents to discs.
 
     Raises:
         MeshError: the discs are too many or too dense, or the search for an arrangement fails.
@@ -92,10 +93,10 @@ def random_arrangement(
 def matched_arrangement(cell: cell_section.Cell) -> Arrangement:
     """Place discs at random, with the neighbour distances of a measured window.
 
-    Quantiles of the radii in the window `cell.matched`, in random order, are scaled to the fraction. The first centres
-    are random, with gaps of at least `min_gap` mean diameters between discs or coatings. Then `random_fibres.matched`
-    moves fibres one by one, until the distances to the two nearest neighbours are distributed as in the window, or the
-    moves run out. Finally, `clear_shift` moves the arrangement.
+    The radii are quantiles of the radii in the window `cell.matched`, in random order, scaled to the fibre fraction.
+    The first centres are random, with gaps of at least `min_gap` mean diameters between discs or coatings. Then
+    `random_fibres.matched` moves fibres one by one, until the distances to the two nearest neighbours are distributed
+    as in the window, or the moves run out. Finally, `clear_shift` moves the cell sides away from tangents to discs.
 
     Raises:
         MeshError: the search for an arrangement fails.

@@ -1,4 +1,4 @@
-"""Represent the coarse mesh of a rectangular cell, with periodic images of nodes and edges on interfaces."""
+"""Represent the coarse mesh of a rectangular cell: elements, periodic images of nodes, edges on interfaces."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -15,20 +15,20 @@ HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
-    """Return the mask (k,) of edges (k, 2, 2), or points (k, 1, 2), on the sides of a rectangle [0, `size`]."""
+    """Mark edges with `ends` (k, 2, 2), or points (k, 1, 2), on a side of the rectangle [0, `size`]: mask (k,)."""
     return np.asarray(((ends == 0).all(axis=1) | (ends == size).all(axis=1)).any(axis=1))
 
 
 def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]:
-    """Yield the pairs of points that differ by one period.
+    """Yield the pairs of points on opposite sides that differ by one period.
 
     Args:
         points: (n, 2) nodes or edge middles; coordinates on sides are exactly 0 or the period.
         period: (2,) width and height, or `CoarseMesh.shift` for a cell that may lack periodic images.
 
     Yields:
-        The axis normal to a pair of sides, the points (k,) on the side at 0, and the partners (k,) on the side at the
-        period, both in ascending order along the side.  Points without a partner, as beside voids, are left out.
+        The axis (0, then 1) normal to two sides, the points (k,) on the side at 0, and the partners (k,) on the other
+            side, in ascending order along the sides.  Points without a partner, as beside voids, are left out.
     """
     for axis in (0, 1):
         along = points[:, 1 - axis]
@@ -52,18 +52,18 @@ class CoarseMesh:
         phase: (m,) index into `phases`; the first phase is "matrix".
         precedence: (m,) sort key for the numbers of constituents: least in the matrix, else the fibre number, or the
             phase if fibres have no numbers.
-        representative: (n,) representative node of each node class on the torus: x = width -> x = 0,
-            y = height -> y = 0; idempotent.
+        representative: (n,) node that represents each node on the torus: the image at x = 0 and y = 0, if any, or
+            itself.
         ellipses: k circles and ellipses in the plane; periodic images have separate entries.
         arc_edges: (a, 2) edges with both ends on one ellipse, up to rounding.
         arc_circle: (a,) the ellipse of each edge in `arc_edges`.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
-        snapped: largest move of a node in a user's mesh to make opposite sides match.
+        snapped: largest distance by which `repair = "snap"` moved a node of a user's mesh.
         origin: lower left corner of the cell in the coordinates of the user.
-        remarks: lines on fibre tables and fractions in images, on unused curves and nearly round polygons of a file.
+        remarks: lines for the user on a fibre table, on fractions in an image, or on a mesh file.
         boundary: conditions on the sides, `periodic`, `displacement` or `traction`; only periodic nodes have images.
-        centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then
-            the coatings in the same order.
+        centres: (fibres, 2) fibre centres, or None. With centres, `precedence` numbers the fibres from 1, and then the
+            coatings in the same order.
     """
 
     width: float
@@ -91,24 +91,24 @@ class CoarseMesh:
 
     @property
     def shift(self) -> Float:
-        """The distance (2,) between periodic images; 1e30 for a cell without images."""
+        """The distances (2,) between periodic images; 1e30 for a cell without images."""
         return self.period if self.boundary == "periodic" else np.full(2, 1e30)
 
     def scaled(self, factor: float) -> "CoarseMesh":
-        """Return the mesh with size, points and ellipses times `factor`; `origin`, `centres` and `snapped` stay."""
+        """Return a mesh with size, points and ellipses times `factor`; `origin`, `centres` and `snapped` stay."""
         mesh = replace(self, width=factor * self.width, height=factor * self.height, points=factor * self.points)
         return replace(mesh, ellipses=self.ellipses.scaled(factor))
 
 
 def areas(points: Float, triangles: Int32) -> Float:
-    """Compute the signed areas (m,) of triangles, positive counter-clockwise."""
+    """Compute the signed areas (m,) of triangles, positive for counter-clockwise nodes."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     u, v = b - a, c - a
     return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
 def edges(triangles: Int32) -> Int32:
-    """List the directed edges (3m or 4m, 2); row 3 t + i, for pixels 4 t + i, joins corners i + 1 and i + 2 of t."""
+    """List the directed edges (3m or 4m, 2) of m elements; row 3t + i or 4t + i joins corners i + 1, i + 2 of t."""
     return np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
 
 
@@ -119,7 +119,7 @@ def edge_keys(pairs: Int32, nodes: int) -> Int:
 
 
 def twins(keys: Int) -> tuple[Int, Int]:
-    """Find pairs of equal keys (n,); return the two index arrays (p,), in ascending order of keys."""
+    """Find equal keys among `keys` (n,); return the index arrays (p,) of both members, in ascending order of keys."""
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     return order[same], order[same + 1]
@@ -141,8 +141,8 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
     """Flip the chords of triangles (m, 3) with two edges on one circle; return all triangles.
 
     Curved edges would give such a triangle an angle of 180 degrees. Up to eight rounds replace the third edge, a chord,
-    by the other diagonal of both triangles at the chord. Chords between phases or of one triangle stay. `nodes` is the
-    node count.
+    by the other diagonal of both triangles at the chord. Chords between phases, and chords with a triangle on one side
+    only, stay. `nodes` is the node count.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -165,7 +165,7 @@ def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circl
 
 
 def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
-    """Find triangles (b,) with two edges on one circle, and the corner (b,) between both; `nodes` is the node count."""
+    """Find triangles (b,) with two edges on one circle, and the corner (b,) between these; `nodes` counts the nodes."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)
     keys = edge_keys(arc_edges, nodes)

@@ -19,8 +19,8 @@ SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
     """Unwrap a connected submesh from the torus by a walk through the triangles.
 
-    The submesh is contractible if every class has a unique unwrapped position. Only then can it rotate: a submesh that
-    winds around the torus cannot.
+    The submesh is contractible if every class has a unique unwrapped position. Only a contractible submesh can rotate;
+    a submesh that winds around the torus cannot.
 
     Returns:
         Shifts (t, 2) of the triangles by whole periods, and whether the submesh is contractible.
@@ -60,7 +60,7 @@ def fibre_circles(torus: Torus) -> Float:
     """Return centre and radius (constituents, 3) of each fibre's outer circle, in any periodic image.
 
     Fibres that are not round have the radius NaN, and the centre in `CoarseMesh.centres` or else the area centroid. The
-    centroid is NaN for fibres that wind around the torus. The matrix has NaN for both.
+    centroid is NaN for fibres that wind around the torus. The matrix has the centre and radius NaN.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
@@ -89,7 +89,7 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def fibre_frames(torus: Torus) -> Float:
-    """Return the frame F (constituents, 2, 2) of each fibre's outer ellipse: points c + F p, |p| = 1, centre c.
+    """Return the frame F (constituents, 2, 2) of each fibre's outer ellipse, with centre c and points c + F p, |p| = 1.
 
     The frame is NaN for the matrix, and for fibres with a boundary that is not on concentric ellipses.
     """
@@ -101,9 +101,9 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find the fibres (k,) with boundaries on concentric ellipses.
+    """Find the fibres (k,) with a boundary on concentric ellipses, the largest of which surrounds the fibre.
 
-    The largest must surround the fibre. Also returns a plane edge (k,) on it, and the mask (k,) of round fibres.
+    Also returns, for each of these fibres, a plane edge (k,) on the largest ellipse, and the mask (k,) of round fibres.
     """
     if not len(torus.mesh.ellipses):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, bool)
@@ -128,8 +128,8 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """Return the numbers (constituents,) of fibres and coatings, and the mask (constituents,) of fibres.
 
-    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of its fibres; without fibres, it counts
-    as a fibre.
+    Fibre numbers begin at 1; the matrix has 0. A coating has the lowest number of the fibres that it touches; a coating
+    without fibres counts as a fibre.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == phase_names.COATING for name in torus.mesh.phases])[phase]
@@ -149,7 +149,8 @@ def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
     """Return the coating thickness (fibres,), 0 for fibres without a coating.
 
     `numbers` and `is_fibre` come from `fibre_numbers`; `semi_axes` is (constituents, 2). The thickness is the
-    difference of the semi-axes: NaN without semi-axes, or if the two axes give different thicknesses.
+    difference between semi-axes of coating and fibre: NaN without semi-axes, or if both axes give different
+    thicknesses.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1

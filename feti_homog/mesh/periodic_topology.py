@@ -34,8 +34,8 @@ class Torus:
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; matrix constituents come first.
         class_keys, edge_keys: ascending numbers of the classes and torus edges in the whole cell.
-        at_void: (torus edges,) mask of edges at voids: one triangle in the whole cell, not on a side without images.
-        is_whole: whether no triangle in the cell is missing.
+        at_void: (torus edges,) mask of edges at voids: one triangle in the cell, but on no side without images.
+        is_whole: whether the mesh has all triangles of the cell.
     """
 
     mesh: CoarseMesh
@@ -79,7 +79,7 @@ class Torus:
 
     @cached_property
     def sides(self) -> tuple[Int, Int, Int]:
-        """The two triangles (k,) and (k,) beside each shared torus edge, and the number (k,) of the edge."""
+        """The triangles (k,) and (k,) on both sides of each shared torus edge, and the number (k,) of this edge."""
         edge = np.flatnonzero(np.bincount(self.triangle_torus_edges.ravel()) == 2)
         return *edge_pairs(self.triangle_torus_edges), edge
 
@@ -92,13 +92,13 @@ class Torus:
         return mask
 
     def low_copies(self, chosen: Bool) -> Int32:
-        """Return the ends (k, 2) of torus edges in the mask `chosen`.  On cell sides, the left or lower copy counts."""
+        """Return end nodes (k, 2) of torus edges in the mask `chosen`: on cell sides, of the left or lower image."""
         is_high = (self.mesh.points[self.edges] == self.mesh.shift).all(axis=1).any(axis=1)
         return np.asarray(self.edges[chosen[self.torus_edge] & ~is_high], np.int32)
 
     @property
     def voids(self) -> int:
-        """The number of connected boundaries of voids."""
+        """The number of connected void boundaries."""
         classes, ends = np.unique(self.edge_ends[self.at_void], return_inverse=True)
         return int(components(len(classes), *ends.reshape(-1, 2).T).max(initial=-1)) + 1
 
@@ -155,8 +155,8 @@ class Torus:
     def touching(self) -> Bool:
         """The mask (classes,) of classes where two constituents meet more than once, or without a common edge.
 
-        At an ordinary interface node, each of two constituents fills one sector of the surrounding triangles.  Without
-        the whole cell, all entries are False: such meshes have only round fibres, which touch nowhere.
+        At an ordinary interface node, each of two constituents fills one sector of the surrounding triangles.  If
+        `is_whole` is false, all entries are False: such meshes have only round fibres, which touch nowhere.
         """
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
@@ -171,12 +171,12 @@ class Torus:
 
     @cached_property
     def never_part(self) -> Bool:
-        """The mask (classes,) of inseparable classes, where three or more constituents meet, or two touch."""
+        """The mask (classes,) of joined nodes, where three or more constituents meet, or two are `touching`."""
         return np.asarray((self.meeting > 2) | self.touching)
 
     @cached_property
     def edge_lengths(self) -> Float:
-        """The length (torus edges,) of each torus edge, along the chord for edges on ellipses."""
+        """The length (torus edges,) of each torus edge; curved edges count with their chord."""
         ends = self.mesh.points[self.edges]
         lengths = np.empty(len(self.edge_keys))
         lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
@@ -184,11 +184,11 @@ class Torus:
 
     @cached_property
     def arcs(self) -> Int:
-        """The plane edges (a,) of the mesh's `arc_edges`."""
+        """The numbers (a,) of the plane edges in `CoarseMesh.arc_edges`."""
         return self.plane_edges(self.mesh.arc_edges)
 
     def plane_edges(self, pairs: Int32) -> Int:
-        """Find the plane edge (k,) between each pair (k, 2) of plane nodes."""
+        """Find the plane edge (k,) between each pair (k, 2) of plane nodes; every pair must be an edge of the mesh."""
         n = len(self.mesh.points)
         if not len(pairs):
             return np.zeros(0, np.int64)
@@ -215,7 +215,7 @@ class Torus:
         return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
-        """Return the part (m,) of each triangle, for constituents cut at the sides (Fig. 2a, `bodies = "plane"`)."""
+        """Return the part (m,) of each triangle if cell sides cut constituents apart (Fig. 2a, `bodies = "plane"`)."""
         one, other = edge_pairs(self.triangle_edges)
         same = self.constituent[one] == self.constituent[other]
         label = components(len(self.constituent), one[same], other[same])
@@ -234,7 +234,7 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     """Find the two triangles (k,) and (k,) beside each shared edge, in ascending order of edges.
 
-    Memory grows with the largest edge number.
+    The memory is proportional to the largest edge number.
     """
     edges, sides = triangle_edges.ravel(), np.arange(triangle_edges.size)
     first, last = np.zeros((2, edges.max(initial=-1) + 1), np.int64)
@@ -244,13 +244,13 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 
 
 def components(n: int, one: Int, other: Int) -> Int:
-    """Return labels (n,) of the connected components of the graph with n vertices and the edges (one, other)."""
+    """Label the n vertices of a graph by connected component; edges join the vertices `one` (k,) and `other` (k,)."""
     graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
-    """Return the distinct `numbers` (k,), ascending, and the index of every entry.  All numbers are below `size`."""
+    """Return the distinct `numbers` (k,), ascending, and the index of every entry in them.  All are below `size`."""
     if numbers.size < FEW * size:
         members, place = np.unique(numbers, return_inverse=True)
         return np.asarray(members), np.asarray(place.reshape(numbers.shape))
@@ -269,7 +269,7 @@ def renumber(label: Int, order: Int) -> Int:
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
-    """Find the plane edges: `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
+    """Find the plane edges of a mesh; return `edges` (e, 2) and `triangle_edges` (m, 3 or 4), as in `Torus`."""
     start, stop = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel()
     low, high, n = np.minimum(start, stop), np.maximum(start, stop), len(mesh.points)
     # Sides in ascending order of the lower node, then of the other: sparse matrices sort faster than `np.unique`.

@@ -46,7 +46,7 @@ class ReferenceLattice:
 
     @classmethod
     def of(cls, refine: int, order: int) -> ReferenceLattice:
-        """Return the lattice of `refine` halvings for elements of the `order` 1 or 2."""
+        """Return the lattice after `refine` splits of all triangles in four, for elements of the `order` 1 or 2."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
         for _ in range(refine):  # child i keeps corner i, the last is in the middle
@@ -74,15 +74,15 @@ class ReferenceLattice:
 
     @property
     def halvings(self) -> int:
-        """The number of times that the triangle is split in four."""
+        """The number of times that all triangles of the lattice were split in four."""
         return (self.intervals // self.order).bit_length() - 1
 
     def coarser(self, fewer: int = 1) -> ReferenceLattice:
-        """Return the lattice without the last `fewer` halvings."""
+        """Return the lattice without its last `fewer` splits in four."""
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """Find the indices (q,) of the nodes of this lattice in a finer lattice."""
+        """Find the indices (q,) that the nodes of this lattice have in a refined lattice, `finer`."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
@@ -110,7 +110,7 @@ class FineMesh:
     Attributes:
         points: (n, 2) plane positions.
         nodes: (t, q) plane node at each lattice node of each coarse triangle.
-        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; other triangles are affine images.
+        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; else its map from the lattice is affine.
         node_class: (n,) class of each plane node; degrees of freedom belong to classes.
         n_classes: c, the number of classes.
         lattice: the lattice in every coarse triangle.
@@ -131,7 +131,7 @@ class FineMesh:
 
 
 def halved(pixels: Submesh) -> Submesh:
-    """Cut pixels (t, 4) into triangles (2t, 3).
+    """Cut each pixel (t, 4) of a submesh along a diagonal into two triangles (2t, 3).
 
     Diagonals join nodes with an even sum of row and column. A submesh of triangles is returned unchanged.
     """
@@ -196,7 +196,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
-    """Concatenate meshes that have one lattice and no common nodes."""
+    """Concatenate refined meshes that have one lattice and no common nodes; shift node and class numbers."""
     nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
     return FineMesh(
@@ -210,7 +210,7 @@ def joined(meshes: Sequence[FineMesh]) -> FineMesh:
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
-    """Return the class (k,) of node `position` (k,), 1 to M - 1, on a torus `edge` (k,), after `n_classes` vertices."""
+    """Return the class (k,) of node `position` (k,), 1 to M - 1, on torus edges (k,), after `n_classes` vertices."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 
@@ -227,7 +227,8 @@ def elimination_order(mesh: FineMesh) -> Int:
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     """Order the nodes (n,) of triangles by nested dissection.
 
-    Triangles have `centres` (t, 2) and `nodes` (t, q), corners first; `inside` (q,) orders the nodes of one triangle.
+    Triangles have `centres` (t, 2) and `nodes` (t, q), corners first; `inside` (q,) ranks the nodes within one
+    triangle.
     """
     size = int(nodes.max()) + 1
     one, other = twins(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), size))
@@ -245,7 +246,8 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
     """Bisect triangles recursively; return their leaves (t,) in a binary tree with some empty leaves.
 
-    A cut runs along x or y, near the middle of a part, across the fewest sides between `neighbours`, two arrays (k,).
+    A cut along x or y, near the middle of a part, crosses the fewest sides between the triangles `neighbours`, (k,) and
+    (k,).
     """
     t, first = len(centres), np.array([0, len(centres)])
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]

@@ -24,7 +24,7 @@ ROWS = (
 
 @dataclass(frozen=True)
 class Submesh:
-    """The coarse mesh of a subdomain: v plane vertices, e plane edges and t triangles.
+    """The coarse mesh of a subdomain: v plane vertices, e plane edges and t triangles or, before `halved`, pixels.
 
     Plane vertices belong to node classes, and plane edges to torus edges. The local numbers of classes and torus edges
     ascend with the global numbers `class_keys` and `edge_keys`.
@@ -35,15 +35,14 @@ class Submesh:
         phase: name of the material phase; empty for a subdomain across materials.
         constituent: (t,) constituent of each triangle.
         points: (v, 2) positions of the vertices in the plane.
-        triangles: (t, 3) vertices, counter-clockwise.
-        triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
+        triangles: (t, 3) vertices, counter-clockwise; (t, 4) for pixels.
+        triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3); (t, 4) for pixels.
         edges: (e, 2) start and end vertices.
         circles: (e, 3) centre and radius of the circle of each edge; radius NaN on ellipses, 0 for straight edges.
         turns: (e,) increment of the ellipse parameter along each edge; 0 for straight edges.
         vertex_class: (v,) class of each vertex.
         edge_class: (e,) torus edge of each plane edge.
-        at_void: (torus edges,) whether a torus edge bounds a void, as in `Torus.at_void`.
-        debonded: (torus edges,) whether a torus edge is debonded from the start.
+        at_void, debonded: (torus edges,) masks of torus edges at voids and debonded from the start, as in `Torus`.
         touching: (classes,) as in `Torus.touching`.
         class_keys, edge_keys: global numbers of classes and torus edges.
         period, origin: (2,) width and height of the cell; its lower left corner in the coordinates of the user.
@@ -81,7 +80,7 @@ class Submesh:
 
     @property
     def at_side(self) -> Bool:
-        """The mask (torus edges,) of edges on sides without a periodic image."""
+        """The mask (torus edges,) of edges on cell sides, for cells without periodic images; else all False."""
         mask = np.zeros(len(self.edge_keys), bool)
         if self.boundary != "periodic":
             mask[self.edge_class] = on_sides(self.points[self.edges], self.period)
@@ -116,11 +115,11 @@ class SubdomainTable:
 
 @dataclass(frozen=True)
 class SubmeshesOfRank:
-    """The subdomains of a rank as one submesh, before `cut`.
+    """The subdomains of a rank, joined to one submesh; `cut` separates the subdomains.
 
     Attributes:
         whole: all triangles, or pixels (t, 4), of the rank as one submesh.
-        member: (t,) subdomain of each triangle or pixel, counted on this rank.
+        member: (t,) subdomain of each triangle or pixel, numbered from 0 on this rank.
         index, body, phase: attributes of each subdomain, as in `Submesh`.
     """
 
@@ -146,7 +145,7 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: Int
 ) -> Iterator[SubmeshesOfRank]:
-    """Yield the submeshes of each rank, in rank order; a rank without triangles has none.
+    """Yield the joined subdomains of each rank, in rank order; the mesh of a rank without subdomains is empty.
 
     `subdomain` (m,) has the subdomain of each triangle, and `pinned` the keys of the pinned classes.
     """
@@ -169,7 +168,7 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """Restrict a submesh to the coarse triangles `members` (m,)."""
+    """Restrict a submesh to the coarse triangles or pixels `members` (m,), with all their vertices and edges."""
     edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
     corners, ends = submesh.triangles[members], submesh.edges[edges]
     vertices, place = present(np.concatenate([corners.ravel(), ends.ravel()]), len(submesh.points))
@@ -192,7 +191,7 @@ def pinned_classes(torus: Torus) -> Int:
     """Return the keys of the pinned classes: one in a periodic cell, all on displaced sides, none with tractions.
 
     The one class, Eq. (15), lies inside the matrix if possible, nearest to a corner. On an interface, it would join
-    both faces; in a fibre, it would hold the fibre when all bonds are broken.  Its choice only shifts the fluctuation.
+    both faces; in a fibre, it would hold a fibre without intact bonds.  Its choice only shifts the fluctuation.
     """
     if torus.mesh.boundary != "periodic":
         nodes = on_sides(torus.mesh.points[:, None], torus.mesh.period)
@@ -248,7 +247,7 @@ def _whole(torus: Torus, pinned: Int) -> Submesh:
 
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
-    """Join the subdomains of all parts in ascending order of `index`."""
+    """Join the subdomains of several ranks or tiles, `parts`, in ascending order of `index`."""
     index = _all(parts, "index")
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
@@ -262,7 +261,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
-    """Join submeshes; identify classes and torus edges, but neither plane vertices nor plane edges."""
+    """Join submeshes; equal class keys and edge keys become one, but plane vertices and edges stay separate."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     _, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = np.concatenate([mesh.class_keys[mesh.pinned] for mesh in meshes])
@@ -280,7 +279,7 @@ def joined_meshes(meshes: list[Submesh]) -> Submesh:
 
 
 def _all(parts: Sequence[object], name: str) -> Array:
-    """Concatenate the arrays `name` of all parts."""
+    """Concatenate the arrays in the attribute `name` of all parts."""
     return np.concatenate([getattr(part, name) for part in parts])
 
 

@@ -34,14 +34,14 @@ class Arrangement:
     """N separate fibres and voids on the torus with periods `width` and `height`.
 
     Attributes:
-        outlines: N outlines without rings. Fibre k + 1 of a case has the index k; voids follow the fibres.
+        outlines: N outlines without rings: coatings, walls of hollow fibres. Fibre k + 1 has the index k; voids follow.
         phase: (N,) phases of the outlines.
         coating: (N,) thickness of the rings around the outlines, 0 without a ring.
         is_hollow: (N,) mask of voids in hollow fibres; their rings have the fibre phase, other rings are coatings.
         mesh_order: (N,) meshing order, which changes a few triangles; by index if None.
         row: (N,) row indices in the fibre table; None for cells without a table.
         origin: lower left corner of the cell in the coordinates of the table.
-        remarks: lines on the differences between the cell and the table.
+        remarks: lines for the user on the differences between the cell and the table.
     """
 
     width: float
@@ -65,28 +65,28 @@ class Arrangement:
         phase: tuple[str, ...],
         coating: Float | float = 0.0,
     ) -> Arrangement:
-        """Arrange discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
+        """Make the arrangement of discs with centres (N, 2), radii (N,) and coating thicknesses (N,) or ()."""
         thickness = np.broadcast_to(coating, radii.shape).astype(float)
         return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
 
     @property
     def centres(self) -> Float:
-        """The centres (N, 2)."""
+        """The centres (N, 2) of the outlines."""
         return self.outlines.centres
 
     @cached_property
     def radii(self) -> Float:
-        """The radii (N,) of equal-area discs, without rings."""
+        """The radii (N,) of discs with the areas of the outlines, without rings."""
         return self.outlines.radii
 
     @property
     def size(self) -> Float:
-        """The width and height (2,)."""
+        """The width and height (2,) of the torus."""
         return np.array([self.width, self.height])
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating if any."""
+        """The phases of the cell: matrix, fibre phases in the order of first occurrence, coating if any; no voids."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
         has_coating = (self.coated & ~self.is_hollow).any()
         return (MATRIX, *named, COATING) if has_coating else (MATRIX, *named)
@@ -103,13 +103,13 @@ class Arrangement:
 
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The phases (N,) within the outlines, and the phases (N,) of the rings around the outlines."""
+        """The phases (N,) within the outlines, and the phases (N,) of the rings around the outlines, if any."""
         pairs = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
         rings = tuple(name if is_hollow else COATING for name, is_hollow in pairs)
         return tuple(VOID if is_hollow else name for name, is_hollow in pairs), rings
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """Return the region numbers (k,), from 1, of the insides or rings of fibres (k,).
+        """Return the region numbers (k,), from 1, of fibres (k,) or, where `is_ring` (k,), of their rings.
 
         Coatings follow all fibres, in the order of fibres; the ring of a hollow fibre has the fibre number.
         """
@@ -117,12 +117,12 @@ class Arrangement:
 
     @property
     def order(self) -> Int:
-        """The indices (N,) in meshing order."""
+        """The indices (N,) of the outlines in meshing order."""
         return np.arange(len(self.phase)) if self.mesh_order is None else self.mesh_order
 
     @property
     def fibres(self) -> int:
-        """The fibre count."""
+        """The fibre count, without voids."""
         return int((~self.is_void).sum())
 
     @property
@@ -137,20 +137,17 @@ class Arrangement:
 
     @cached_property
     def outer(self) -> Outlines:
-        """The N outlines enlarged by rings."""
+        """The N outlines, enlarged by their rings."""
         return self.outlines.grown(self.coating)
 
     @property
     def outer_radii(self) -> Float:
-        """The radii (N,) of equal-area discs, plus the thickness of rings."""
+        """The radii (N,) of discs with the areas of the outlines, plus the thickness of rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
     def shells(self) -> tuple[Outlines, Int]:
-        """All k outlines, and the indices (k,) of their fibres.
-
-        The outer outline of a fibre precedes the inner outline of its ring.
-        """
+        """All k outlines, with the outer before the inner outline of a ring, and the indices (k,) of their fibres."""
         coated = np.flatnonzero(self.coated)
         fibre = np.concatenate([np.arange(len(self.phase)), coated])
         order = np.argsort(fibre, kind="stable")
@@ -168,8 +165,8 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
     The candidates along an axis are the middles of the widest gaps between tangents. Two candidates make a corner; the
     corner farthest from all outlines is selected. In symmetric cells, for example with two discs, several corners are
-    equally far up to rounding errors: the first is selected, so that the length unit does not matter. Corners in voids
-    (`in_voids`) are excluded if others exist.
+    equally far up to rounding errors: the first is selected, so that cells scaled to another length unit have the same
+    corner. Corners in voids (`in_voids`) are excluded if others exist.
     """
     size, outlines = arrangement.size, arrangement.shells[0]
     for narrowest in (NARROWEST, 0.0):
@@ -210,18 +207,18 @@ def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:
-    """Return the vectors (n, k, 2) from points (n, 2) to the nearest images of the centres."""
+    """Return the vectors (n, k, 2) from `places` (n, 2) to the nearest images of the k centres of outlines."""
     return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
 
 
 def _tangents(arrangement: Arrangement) -> Float:
-    """Return the coordinates (k, 2, 2) of tangents normal to each axis, low then high, of k outlines and rings."""
+    """Return the coordinates (k, 2, 2), axis by axis, where each of k outlines and rings begins and ends."""
     outlines, _ = arrangement.shells
     return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
-    """Find all pairs i <= j of centres and images closer than `reach`.
+    """Find all pairs i <= j of centres, periodic images included, that are closer than `reach`.
 
     A centre and its image form a pair i = j, which occurs from both ends; other pairs of images occur once.  Returns
     i (k,), j (k,), and the vectors (k, 2) from i to the image of j.  Raises MeshError beyond about MOST_PAIRS pairs.

@@ -1,4 +1,4 @@
-"""Make a window of a micrograph periodic: move fibres apart that overlap across the border."""
+"""Make a window of a micrograph periodic: move apart the fibres that overlap across the border."""
 
 import numpy as np
 from scipy.optimize import nnls
@@ -22,11 +22,11 @@ def moves(outlines: Outlines, size: Float) -> Float:
 
     The torus has the periods `size` (2,). The moves are a local minimum of sum |d|^2. Gaps across the border become at
     least the smallest gap inside the window, clipped to the range LEAST_GAP to MOST_GAP; gaps inside stay at least as
-    large as this gap or, if they are smaller, as they were. Gaps are relative to the sum of the radii. Each step
-    replaces the constraints |v| >= r on vectors v between centres by n . v >= r, with the present directions n; since
-    n . v <= |v|, the solution satisfies the constraints. Outlines other than discs have the radii of equal-area discs;
-    n is the direction of the largest gap n . v - r, where r is the sum of both supports along n.  Raises MeshError if
-    the torus has no room for such moves, or if they do not settle in MAX_STEPS steps.
+    large as this gap or, if they are smaller, do not shrink. Gaps are relative to the sum of the radii. Each step
+    replaces the constraints |v| >= r, with the vector v between two centres and r the sum of radii and gap, by
+    n . v >= r, with the present direction n; since n . v <= |v|, the solution satisfies the constraints. For outlines
+    other than discs, n is the direction of the largest gap, and r the sum of gap and both supports along n.  Raises
+    MeshError if the torus has no room for such moves, or if they do not settle in MAX_STEPS steps.
     """
     centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
     reach, unit = 3 * float(outlines.longest.max()), float(radii.mean())
@@ -64,10 +64,10 @@ def moves(outlines: Outlines, size: Float) -> Float:
 def _least_moves(outlines: Outlines, pairs: Float, moved: Float, size: Float) -> Float:
     """Return the moves d (N, 2) of least sum |d|^2 that keep all pairs (k, 5) apart.
 
-    A pair has two fibres, the periods between them, and a least gap. It satisfies n . (v + d_second - d_first) >= r,
-    with the vector v between the centres, the direction n after the moves `moved`, and r from `parting` plus the gap.
-    Raises MeshError without a solution.  Non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares
-    Problems, 1974, chapter 23.
+    A row of `pairs` has two fibres, the periods between them, and a least gap. Moves satisfy
+    n . (v + d_second - d_first) >= r, with the vector v between the centres, the direction n after the moves `moved`,
+    and r from `parting` plus the gap. Raises MeshError without a solution.  Non-negative least squares: C. L. Lawson,
+    R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
     centres, unit, count = outlines.centres, float(outlines.radii.mean()), len(pairs)
     ends = pairs[:, :2].T.astype(np.intp)

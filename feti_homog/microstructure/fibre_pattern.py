@@ -33,7 +33,7 @@ class FibrePattern:
 
     @property
     def size(self) -> Float:
-        """The width and height (2,)."""
+        """The width and height (2,) of the rectangle."""
         return np.array([self.width, self.height])
 
     @property
@@ -53,7 +53,7 @@ class FibrePattern:
 
     @property
     def fibre_fraction(self) -> float:
-        """The area fraction sum_i pi R_i^2 / area of the discs with centres in the rectangle.
+        """The area fraction of the discs with centres in the rectangle: sum_i pi R_i^2 / area.
 
         For a window the value is unbiased: on average, these discs cover as much outside as other discs cover inside.
         """
@@ -68,7 +68,7 @@ class FibrePattern:
     def images(self, reach: float) -> tuple[Float, Int]:
         """Return centres (m, 2) of discs and images within `reach` of the rectangle, and disc indices (m,).
 
-        The N discs in the rectangle come first; a window has no images.
+        The N discs in the rectangle come first; for a window, there are no images.
         """
         number = np.arange(self.count)
         if not self.periodic:
@@ -82,10 +82,10 @@ class FibrePattern:
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Read the fibre pattern of a window, with at least two fibres, from a table.
+    """Read the fibre pattern of a window from a table; ellipses count as equal-area discs, voids are left out.
 
     `size` is the width and height of the window, by default the size in the table. The lower left corner is `left` and
-    `bottom` of the table, by default 0. Ellipses count as equal-area discs; voids are excluded.
+    `bottom` of the table, by default 0.
 
     Raises:
         CaseError: the table is faulty or lacks the size; fibres are fewer than two, outside, or at one place.

@@ -1,4 +1,4 @@
-"""Read a fibre table, as measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
+"""Read a fibre table, for example measured in a micrograph: a row per fibre, with columns x, y, radius and others."""
 
 from __future__ import annotations
 
@@ -41,9 +41,8 @@ class FibreTable:
         columns: name -> numbers (N,), for every name in `table_columns.NUMBERS`.
         given: names of the columns in the table.
         phase: N names, "fibre" by default, "void" for voids.
-        width, height: size of the cell; None if the table lacks it.
-        left, bottom: coordinates of the lower left corner; None if the table lacks them.
-        remarks: lines on unused parts of the table.
+        width, height, left, bottom: size of the cell, and its lower left corner; None if the table lacks them.
+        remarks: lines for the user on unused parts of the table.
     """
 
     name: str
@@ -59,12 +58,12 @@ class FibreTable:
 
     @cached_property
     def outlines(self) -> Outlines:
-        """The N outlines without coatings, in the unit of the table, for tables without faults."""
+        """The N outlines in the unit of the table, coatings excluded; the table must have no faults."""
         return outlines_of(self.columns)
 
     @property
     def radius(self) -> Float:
-        """The radii (N,) of discs, and of equal-area discs for other outlines."""
+        """The radii (N,) of discs with the areas of the outlines, without coatings."""
         return self.outlines.radii
 
     @property
@@ -84,17 +83,17 @@ class FibreTable:
 
     @property
     def centres(self) -> Float:
-        """The centres (N, 2)."""
+        """The centres (N, 2) of the fibres in the coordinates of the table."""
         return np.column_stack([self.columns["x"], self.columns["y"]])
 
     @property
     def size(self) -> Float:
-        """The width and height (2,) of the cell, NaN where unknown."""
+        """The width and height (2,) of the cell, NaN if the table lacks them."""
         return np.array([self.width, self.height], float)
 
     @property
     def places(self) -> Float:
-        """The centres (N, 2) relative to the lower left corner of the cell."""
+        """The centres (N, 2) of the fibres, relative to the lower left corner of the cell."""
         return self.centres - self.corner
 
     @property
@@ -115,16 +114,16 @@ class FibreTable:
 
     @property
     def outer_radius(self) -> Float:
-        """The radii (N,) plus the thickness of coatings."""
+        """The radii (N,) of the fibres, plus the thickness of their coatings."""
         return self.radius * (1 + self.coating)
 
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Read a fibre table from a text file.  Fibres may overlap.
 
-    The first line, or `columns`, lists the names: x, y, radius (or a, b), phase, coating, angle and other names that
-    `understood` accepts. A line of units may follow, then a line per fibre. Commas, semicolons, tabs or else spaces
-    separate columns; commas may be decimal marks if other characters separate columns. "#" begins a comment;
+    The first line, or `columns`, lists the column names: x, y, radius (or a, b), phase, coating, angle and other names
+    that `understood` accepts. A line of units may follow, then a line per fibre. Commas, semicolons, tabs or else
+    spaces separate columns; commas may be decimal marks if other characters separate columns. "#" begins a comment;
     "# width = 120, height = 80" gives the cell size, and "left" and "bottom" give the lower left corner.
 
     Raises:
@@ -178,7 +177,7 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
 
 
 class _Faults:
-    """The list of faults in a table, with row numbers."""
+    """The faults of a table so far, one line each, with row numbers."""
 
     def __init__(self, name: str) -> None:
         self.lines: list[str] = []
@@ -196,7 +195,7 @@ class _Faults:
 def _check_names(
     words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
 ) -> None:
-    """Add repeated, misspelt and missing column names and mixed units to the faults; CaseError without known names."""
+    """Add faults of column names: repeated, misspelt, missing, in mixed units; CaseError if no name is known."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -234,7 +233,7 @@ def _remarks(name: str, words: Sequence[str], unread: Sequence[str]) -> tuple[st
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """Check all `rows`, and build the table with size and corner from `sizes`.  Raises CaseError with all `faults`."""
+    """Build a table from `rows` {row number: {column: value}} and `sizes`; CaseError with all `faults`, old and new."""
     for row, cells in rows.items():
         has_size = any(set(replacing) <= cells.keys() for replacing in REPLACING)
         for key in ("x", "y") if has_size else ("x", "y", "radius"):

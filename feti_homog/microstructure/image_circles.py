@@ -82,7 +82,10 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
 
 
 def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chance: float) -> Float:
-    """Return (f - `by_chance`) sqrt(L) (k,): f <= 1 edges per pixel on L visible rim pixels; 0 if 80 % are hidden."""
+    """Measure how many more edges than by chance lie on each circle (k,).
+
+    Returns (f - `by_chance`) sqrt(L) for f edges per pixel, at most 1, on L visible rim pixels; 0 if 80 % are hidden.
+    """
     rim = circles[:, :2] + circles[:, 2:] * RIM[:, None]
     visible = ((rim > 0.0) & (rim < size)).all(axis=2).mean(axis=0)
     length = np.maximum(visible * 2 * np.pi * circles[:, 2], 1.0)
@@ -90,7 +93,7 @@ def _excess(circles: Float, counts: Float | Int, size: tuple[int, ...], by_chanc
 
 
 def _apart(circles: Float, excess: Float) -> Bool:
-    """Mark circles (k,), highest `excess` first, but none that overlaps a marked one by 0.4 of the smaller radius."""
+    """Mark circles (k,), highest `excess` first, unless a marked one overlaps by over 0.4 of the smaller radius."""
     tree, is_apart = cKDTree(circles[:, :2]), np.zeros(len(circles), bool)
     is_covered = np.zeros(len(circles), bool)
     for k in np.argsort(-excess, kind="stable"):

@@ -1,4 +1,4 @@
-"""Read grey images, and label images, such as segmented micrographs, with phase numbers as pixels."""
+"""Read images: grey values, or labels that stand for phases, such as in segmented micrographs."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -20,14 +20,13 @@ WHOLE_NUMBERS = {"1", "P", "L", "I", "I;16", "I;16B", "I;16L", "I;16N"}
 
 
 def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tuple[Int32, tuple[str, ...]]:
-    """Read an image, and replace its labels by phases.
+    """Read an image, and replace its labels by phase numbers.
 
     Returns the phase numbers (rows, columns), the lowest row first, and the phase names, the matrix first, others in
     alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is too large or no image of whole numbers, or its numbers differ from `labels`, one per
-            line.
+        CaseError: the file is too large or no image of whole numbers, or its numbers are not the keys of `labels`.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)
@@ -58,7 +57,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
 def read_image(path: Path, is_grey: bool = False) -> Array:
     """Return the pixels (rows, columns) of an image file, the upper row first; with `is_grey`, as grey values.
 
-    A separate process decodes the file.
+    A separate process with limited memory decodes the file.
 
     Raises:
         CaseError: the file is damaged, too large, not a single image, or, unless `is_grey`, not of whole numbers.

@@ -1,4 +1,4 @@
-"""Arrange the fibres of a table on the torus, with images of one fibre merged; report faults."""
+"""Arrange the fibres of a table on the torus: merge images of one fibre, move fibres of cut windows, report faults."""
 
 from dataclasses import replace
 
@@ -24,8 +24,8 @@ LEAST_CLEARANCE = 1e-3
 def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
     """Arrange the fibres of a table, in row order, and then the voids.
 
-    If several rows list images of one fibre, the first row counts. In a cut window, fibres that overlap across the
-    border are moved apart. With `repairs`, fibres that overlap slightly shrink first.
+    If several rows list images of one fibre, the first row counts. In a cut window (`window` = "cut"), fibres that
+    overlap across the border are moved apart. With `repairs`, fibres that overlap slightly shrink first.
 
     The corner that the table gives remains if no cell side touches a disc and the corner lies in no void (`in_voids`),
     so that the table of a random cell gives the mesh of that cell. Otherwise fibres are shifted (`clear_shift`),
@@ -76,7 +76,7 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
     """Shrink the fibres of a table that overlap slightly.
 
     Fibres that touch, or overlap by up to SAME_FIBRE times the smaller radius, shrink until they separate, but not
-    across the border of a cut window. Returns the table, and a remark with the rows of the shrunk fibres.
+    across the border of a cut window. Returns the table, and one remark with the rows of the shrunk fibres, if any.
     """
     size, centres = table.size, table.places
     retained = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
@@ -115,8 +115,8 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     """Check the fibres of a table and place them on the torus.
 
-    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres, and the cell size (2,). Only cut windows have
-    moves. Raises MeshError as `table_arrangement` does.
+    Returns the rows (k,), centres (k, 2) and moves (k, 2) of fibres and voids, and the cell size (2,). Moves are 0
+    except in cut windows. Raises MeshError as `table_arrangement` does.
     """
     size, centres, is_cut = table.size, table.places, window == "cut"
     # The largest length of every row, and the column of this length.
@@ -168,13 +168,13 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
 
 
 def fibre_rows(table: FibreTable, window: str) -> Int:
-    """Return the table indices (fibres,) of the fibres in the cell, without voids or images."""
+    """Return the table indices (fibres,) of the fibres in the cell; voids and repeated images are left out."""
     is_first, _ = _without_images(table, table.places, table.size, window == "cut")
     return np.flatnonzero(is_first & ~table.is_void)
 
 
 def listed_centres(table: FibreTable, window: str, centres: Float, rows: Int | None = None) -> Float:
-    """Map periodic images `centres` (k, 2) of fibres to the centres in the table, plus the moves by `cut_window.moves`.
+    """Return, for periodic images `centres` (k, 2), the centres that the table lists, plus moves in a cut window.
 
     The images belong to the table indices `rows` (k,), by default to `fibre_rows`.
     """
@@ -189,7 +189,7 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
-    """Return the mask (N,) of rows without an earlier image (all rows if `is_cut`), and faults of images and places."""
+    """Return the mask (N,) of rows without an earlier image, all True if `is_cut`, and faults of images and places."""
     first, second, vector = arrangements.neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, strength, distance = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
@@ -212,7 +212,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Find the pairs of near fibres among the rows `kept` (k,), with the outlines `outer`.
+    """Find the pairs of near fibres among the rows `kept` (k,), with the outlines `outer`, coatings included.
 
     Returns, all (p,): indices into `kept` of both fibres, gaps, radius sums, and the mask of pairs across the border.
     """

@@ -46,13 +46,13 @@ class NearestNeighbours:
 
     @cached_property
     def means(self) -> Float:
-        """The mean distances (k,), NaN for columns without a counted distance."""
+        """The weighted mean distances (k,), NaN for columns without a counted distance."""
         total = (self.weights * np.where(self.weights > 0, self.distances, 0.0)).sum(axis=0)
         return np.where(self.weights.any(axis=0), total, np.nan)
 
     @cached_property
     def deviations(self) -> Float:
-        """The standard deviations (k,) of the distances, NaN for columns without a counted distance."""
+        """The weighted standard deviations (k,) of distances, NaN for columns without a counted distance."""
         counted = np.where(self.weights > 0, self.distances - self.means, 0.0)
         return np.where(self.weights.any(axis=0), np.sqrt((self.weights * counted**2).sum(axis=0)), np.nan)
 
@@ -72,7 +72,7 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Find the `count` nearest neighbours of all fibres; in a periodic cell, images of all fibres count."""
+    """Find the `count` nearest neighbours of all fibres; in a periodic cell, neighbours may be images of fibres."""
     # Within `reach` every fibre in a periodic cell has `count` neighbours.
     reach = (count + 1) // 2 * pattern.size.min()
     if pattern.periodic and pattern.count > count:
@@ -98,7 +98,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
-    """Return the quantiles (count, SHELLS) of the neighbour distances in the pattern `measured`.
+    """Return the quantiles (count, SHELLS) of the distances to the nearest neighbours in the pattern `measured`.
 
     The levels are (i + 1/2) / count; the unit is the mean diameter. Raises ValueError if a window is too small.
     """
@@ -117,7 +117,7 @@ def match_distance(pattern: FibrePattern, wanted: Float) -> float:
 
 
 def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.random.Generator) -> Float:
-    """Move the fibres of a periodic pattern to reduce `match_distance` to the target `wanted`.
+    """Move the fibres of a periodic pattern to reduce the `match_distance` from the target `wanted`.
 
     A trial move takes a random fibre to a random position around its centre, near or far. The move is accepted if the
     fibre keeps `gap` to all other fibres and the distance between the distributions does not increase. The search ends
@@ -153,14 +153,14 @@ def matched(pattern: FibrePattern, gap: float, wanted: Float, generator: np.rand
 
 
 def _distances(places: Float, centres: Float, size: Float) -> Float:
-    """Return the distances (m, N) from points (m, 2) to the nearest images of centres (N, 2)."""
+    """Return the distances (m, N) from `places` (m, 2) to the nearest images of `centres` (N, 2)."""
     x, y = (np.abs(places[:, None, axis] - centres[:, axis]) for axis in (0, 1))
     x, y = np.minimum(x, size[0] - x), np.minimum(y, size[1] - y)
     return np.asarray(np.sqrt(x * x + y * y))
 
 
 def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
-    """Find the two nearest neighbours of fibres (m,).  Returns distances (m, 2) and indices (m, 2)."""
+    """Find the two nearest neighbours of `fibres` (m,) on the torus.  Returns distances and indices (m, 2)."""
     away = _distances(centres[fibres], centres, size)
     rows = np.arange(len(fibres))
     away[rows, fibres] = np.inf
@@ -172,7 +172,7 @@ def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
 
 
 def _mean_square(distances: Float, wanted: Float) -> float:
-    """Return the mean square difference between sorted distances and the target, both (N, SHELLS)."""
+    """Return the mean square difference between `distances` (N, SHELLS), sorted by column, and the sorted `wanted`."""
     difference = np.sort(distances, axis=0) - wanted
     return float(np.cumsum(difference * difference)[-1]) / wanted.size
 
@@ -180,10 +180,10 @@ def _mean_square(distances: Float, wanted: Float) -> float:
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
     """Move centres (N, 2) until discs do not overlap on the torus with periods `size`.
 
-    Returns the centres and the clearance, the smallest ratio of distance to radius sum, at most 2. Without success in
-    `max_steps` steps, the clearance is below 1 and belongs to the centres before the last step. The heavy-ball descent
-    x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps, has no reductions over the discs, so
-    that every machine gets the same numbers.
+    Returns the centres and the clearance: the smallest ratio of the distance between two centres to the sum of their
+    radii, at most 2. Without success in `max_steps` steps, the clearance is below 1 and belongs to the centres before
+    the last step. The heavy-ball descent x += 0.25 f + 0.9 dx, with the previous step dx and the push f of overlaps,
+    has no reductions over the discs, so that every machine gets the same numbers.
     """
     periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
     step, clearance = np.zeros_like(centres), 0.0
@@ -201,14 +201,14 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 
 
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Sum vectors (k, 2) by row to (count, 2), in a fixed order of terms."""
+    """Add up the vectors (k, 2) with equal `rows` (k,) to sums (count, 2), in a fixed order of terms."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """Place the fibres of a pattern at random, with gaps of at least `gap`; return the pattern.
+    """Place the fibres of a pattern at random, with gaps of at least `gap`; return the new pattern.
 
     Raises MeshError for discs denser than DENSEST, or if ATTEMPTS descents of up to `max_steps` steps fail.
     """

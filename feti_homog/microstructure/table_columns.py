@@ -1,6 +1,6 @@
 """Read the lines and column names of fibre tables that spreadsheets and image programs write.
 
-Columns may have units in brackets; diameters, areas and axes of ellipses may replace radii.
+Column names may end with units in brackets; diameters, areas and axes of ellipses may replace radii.
 """
 
 import difflib
@@ -69,12 +69,12 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
 
 
 def delimiter_of(line: str) -> str | None:
-    """Return the delimiter of columns in the first line of a table; None for spaces."""
+    """Return the delimiter of columns in the first line of a table: semicolon, tab or comma; None for spaces."""
     return next((mark for mark in ";\t," if mark in line), None)
 
 
 def cells_of(line: str, delimiter: str | None) -> list[str]:
-    """Split a row into cells without quotation marks."""
+    """Split a row into cells, and strip blanks and quotation marks."""
     return [word.strip().strip('"').strip() for word in line.split(delimiter)]
 
 
@@ -119,7 +119,7 @@ INSTEAD = {"radius": "a"}
 
 @dataclass(frozen=True)
 class SourceColumn:
-    """A column of a file: position in the rows, name, and conversion of the numbers."""
+    """A column of a file: place in each row, name (a key of `NUMBERS` or "phase"), conversion of numbers."""
 
     place: int
     name: str
@@ -132,12 +132,12 @@ class SourceColumn:
 
 
 def _bare(word: str) -> str:
-    """Return a name without its unit, in lower case, with _ for blanks."""
+    """Strip the unit from a column name; return it in lower case, with _ for blanks."""
     return UNIT.sub("", word.strip()).strip().lower().replace(" ", "_")
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Recognize `known` columns, also by names in OTHERS, regardless of case.  Returns columns and unread names."""
+    """Recognize columns by names in `known` or OTHERS; capitals do not matter.  Returns columns and unread names."""
     bare = list(map(_bare, words))
     values: dict[str, Callable[[float], float]] = {}
     if not AXES_OF_PICTURES.isdisjoint(bare):
@@ -160,7 +160,7 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceC
 
 
 def points_down(words: Sequence[str]) -> bool:
-    """Return whether y points down in a table with these names of columns, as in pictures."""
+    """Return whether the column names `words` are from a program whose y axis points down, as in pictures."""
     return not POINTING_DOWN.isdisjoint(map(_bare, words))
 
 
@@ -170,7 +170,7 @@ def are_units(words: Sequence[str]) -> bool:
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the missing column with a name similar to a word; empty without such a column."""
+    """Return the column among `missing` with a name similar to `word`; "" without such a column."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 

@@ -25,7 +25,7 @@ from feti_homog.typing import Bool, Float, Int32
 
 
 def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell) -> CoarseMesh:
-    """Mesh the regions of an image with phase numbers (rows, columns) within smooth outlines.
+    """Mesh the regions of an image within smooth outlines; `phase` (rows, columns) indexes `phases`.
 
     A Gaussian filter, with a standard deviation of one pixel, smooths the mask from `_every_other`; splines follow the
     contour that encloses the area of the mask.
@@ -84,9 +84,9 @@ def mesh_contours(phase: Int32, phases: tuple[str, ...], cell: cell_section.Cell
 
 
 def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
-    """Return the mask (rows, columns) of the phases that are 1, 3, ... contacts away from the matrix.
+    """Return the mask (rows, columns) of pixels in phases that are 1, 3, ... contacts away from the matrix.
 
-    Raises MeshError if three phases touch: then two neighbours are both in the mask, or both outside.
+    Raises MeshError if two touching phases are both in the mask, or both outside: then three phases touch each other.
     """
     n = len(phases)
     a, b = np.divmod(np.unique([phase * n + np.roll(phase, 1, axis) for axis in (0, 1)]), n)
@@ -100,11 +100,11 @@ def _every_other(phase: Int32, phases: tuple[str, ...]) -> Bool:
 
 
 def _size_field(curves: list[Float], indicator: Float, largest: float, size: Float) -> SizeField:
-    """Return the field of edge sizes in cell widths for `curves` of points (k, 2) in pixels.
+    """Return the field of edge sizes, in cell widths, for contours with points (k, 2) in pixels.
 
-    A closed curve has at least MIN_EDGES_AROUND edges, an open curve, cut by a side, at least half this number, unless
-    the edges would be shorter than a pixel. Edges are shorter in narrow passages, between points with opposite
-    gradients of the `indicator`; `largest` is the upper limit.
+    A closed curve has at least MIN_EDGES_AROUND edges, and an open curve, which sides cut, half as many, unless the
+    edges would be shorter than a pixel. Edges are also shorter in narrow passages: between points with opposite
+    gradients of the smoothed mask `indicator`. No edge is longer than `largest`; `size` (2,) is the cell size.
     """
     unit, period = 1.0 / indicator.shape[1], np.array(indicator.shape, float)
     points = np.concatenate([np.zeros((1, 2)), *curves])
@@ -123,7 +123,7 @@ def _size_field(curves: list[Float], indicator: Float, largest: float, size: Flo
 
 
 def _with_phases(content: MshContent, phase: Int32, phases: tuple[str, ...]) -> MshContent:
-    """Assign to each surface the prevailing phase of its elements, and remove the elements of voids.
+    """Give each surface the phase of most of its elements, and remove the elements of voids.
 
     Edges that rise by more than 0.2 of their length, and so turn by more than 87 degrees, become straight.
     """

@@ -36,8 +36,8 @@ class ElementEstimate:
         fibres: fibre count.
         mean_radius: radius of a fibre of mean area; in a table, the mean radius of fibres and voids.
         height: cell height / cell width.
-        interfaces: total length of the interfaces, without coatings.
-        ovals: the elliptic fibres in a table.
+        interfaces: total length of the fibre outlines; the outer outlines of coatings do not count.
+        ovals: the elliptic fibres in a table; empty for other cells.
     """
 
     cell: cell_section.Cell
@@ -49,7 +49,7 @@ class ElementEstimate:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, listed: Arrangement | None) -> ElementEstimate:
-        """Collect the quantities of a cell; `listed` is the arrangement of a table, if any."""
+        """Collect the quantities of a cell; `listed` is the arrangement of a table, None for other cells."""
         if listed is not None:
             from feti_homog.microstructure.shapes import shapes  # only tables have shapes
 
@@ -63,7 +63,7 @@ class ElementEstimate:
 
     @property
     def interface_size(self) -> float:
-        """The element size on interfaces, for at least MIN_EDGES_AROUND edges around the mean fibre."""
+        """The element size on interfaces, small enough for MIN_EDGES_AROUND edges around a fibre of mean radius."""
         asked = self.cell.interface_size or self.cell.mesh_size
         return min(asked, 2 * math.pi * self.mean_radius / MIN_EDGES_AROUND)
 
@@ -88,10 +88,10 @@ class ElementEstimate:
 
 
 def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Float, limit: int = MAX_TRIANGLES) -> None:
-    """Refuse a cell with the `period` (2,) that needs too many elements.
+    """Refuse a cell that needs more than `limit` elements.
 
-    The number is the integral of 1 / (TRIANGLE_AREA h^2) over the cell, where h = `size_at`(x) takes account of narrow
-    gaps and thin coatings. No sum is necessary if the lower bound `smallest` of h already guarantees `limit`.
+    The number is the integral of 1 / (TRIANGLE_AREA h^2) over the cell of size `period` (2,), where h = `size_at`(x)
+    includes narrow gaps and thin coatings. No sum is necessary if the lower bound `smallest` of h guarantees `limit`.
 
     Raises:
         MeshError: the cell needs more than `limit` elements.
@@ -107,7 +107,7 @@ def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Floa
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Return the number of additional triangles around a tip, where `ratio` = size far from the tip / size at the tip.
+    """Return how many triangles a tip adds, where `ratio` = size far from the tip / size at the tip.
 
     With the size h at the tip, the growth g and A = TRIANGLE_AREA, the number is int 2 pi r dr / (A (h + g r)^2) up to
     the radius r where h + g r = ratio h, less the number of triangles of size ratio h in this circle.
@@ -117,6 +117,6 @@ def triangles_of_a_tip(ratio: np.float64 | float) -> float:
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Invert `triangles_of_a_tip`: return the size ratio for `count` triangles, limited to 1 ... RATIOS[-1]."""
+    """Invert `triangles_of_a_tip`: return the size ratio where a tip adds `count` triangles, from 1 to RATIOS[-1]."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

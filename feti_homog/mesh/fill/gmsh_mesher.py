@@ -28,12 +28,12 @@ def begin(
 ) -> UnmeshedCell | CoarseMesh:
     """Begin the periodic coarse mesh of a generated cell.
 
-    Round and elliptic fibres give an `UnmeshedCell` with lines without nodes; a table with polygons gives the mesh. The
-    element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1 before the
-    final scaling, so that cells of one shape have the same mesh at all sizes.
+    Round and elliptic fibres give an `UnmeshedCell`, whose lines have no nodes yet; a table with polygons gives the
+    mesh. The element size is about mesh_size * width, and interface_size * width on circles. The mesh has the width 1
+    before the final scaling, so that cells of one shape have the same mesh at all sizes.
 
     Args:
-        listed: the arrangement of a table; None for other cells, which may be large.
+        listed: the arrangement of a table; None for other cells, which this function arranges.
         marks: directions of debond tips, where the mesh gets nodes. A mark moves onto another mark, or onto a crossing
             of the circle with the cell boundary, within `outline.MERGED` radians.
         policy: rules for the division into tiles.
@@ -74,7 +74,7 @@ def begin(
 
 
 def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> float:
-    """Return the scale, lengths in the cell / lengths in the arrangement."""
+    """Return the ratio of lengths in the cell to lengths in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = cell_sizes.mixed_width(cell) if cell.table is None else cell.table.width
@@ -83,12 +83,10 @@ def arrangement_scale(cell: cell_section.Cell, arrangement: Arrangement) -> floa
 
 @dataclass(frozen=True)
 class UnmeshedCell:
-    """A cell with discs or ellipses, before the lines have nodes.
+    """A cell with discs or ellipses, divided into lines that have no nodes yet.
 
     Attributes:
-        arrangement: the fibres.
-        bare: the lines.
-        sizes: element sizes.
+        arrangement, bare, sizes: the fibres, the lines and the element sizes.
         tiles: the tiling; None for a cell of one tile.
         scale: as in `NodedCell`.
     """
@@ -105,7 +103,7 @@ class UnmeshedCell:
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations) -> NodedCell:
-        """Put nodes on all lines of the cell, and cut the cell into tiles.  Raises MeshError for too many nodes."""
+        """Put the nodes at `stations` on the lines, and cut the cell into tiles; MeshError for too many nodes."""
         lines = self.bare.outline(stations)
         arrangement, sizes, nodes = self.arrangement, self.sizes, np.arange(len(lines.points))
         classes = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
@@ -115,12 +113,10 @@ class UnmeshedCell:
 
 @dataclass(frozen=True)
 class NodedCell:
-    """A cell with nodes on the lines, before the tiles have triangles.
+    """A cell with nodes on all lines, divided into tiles that have no triangles yet.
 
     Attributes:
-        arrangement: the fibres.
-        lines: the outline.
-        parts: the empty tiles.
+        arrangement, lines, parts: the fibres, the outline and the empty tiles.
         scale: lengths in the mesh / lengths in the arrangement.
     """
 
@@ -130,7 +126,7 @@ class NodedCell:
     scale: float
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
-        """Join the fillings of all `parts`, in order, to one mesh."""
+        """Join the fillings of all tiles, in the order of `parts`, to one mesh."""
         ends = self.regions.nodes + np.cumsum([0, *(len(filling.inner) for filling in fillings)])
         filled = map(FilledTile, range(len(fillings)), self.parts, fillings, ends.tolist())
         centres = self.scale * self.arrangement.centres[: self.arrangement.fibres]

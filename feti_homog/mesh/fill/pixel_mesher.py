@@ -15,8 +15,8 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
     """Read the mesh file of a cell, or mesh its image: pixels as elements or, with `cell.smooth`, triangles.
 
     Messages propose the phases in `materials`.  Raises CaseError and MeshError as `msh_reader.read`,
-    `label_image.read_labels` and `contour_mesher.mesh_contours` do, also for pixels that voids cut off, and for voids
-    at sides with tractions.
+    `label_image.read_labels` and `contour_mesher.mesh_contours` do; also if voids separate pixels from all others, or
+    lie at sides with tractions.
     """
     assert cell.file is not None
     if cell.geometry == "mesh":
@@ -54,7 +54,7 @@ def read_cell(cell: cell_section.Cell, materials: tuple[str, ...] = ()) -> Coars
 
 
 def _void_faults(mesh: CoarseMesh, is_solid: Bool) -> list[str]:
-    """List faults: pixels that voids cut off, and voids at sides with tractions.  `is_solid` is (rows, columns)."""
+    """List faults: the first part that voids cut off, and voids at sides with tractions; `is_solid` (rows, columns)."""
     solid, (rows, columns) = np.flatnonzero(is_solid), is_solid.shape
     part = components(len(solid), *Torus.of(mesh).sides[:2])
     faults, sizes = [], np.bincount(part)

@@ -1,4 +1,4 @@
-"""Mesh a periodic cell with any convex outlines, which gmsh cuts at the cell sides and fills.
+"""Mesh a periodic cell with convex outlines of any shape: gmsh cuts the outlines at the sides and fills the cell.
 
 Middle nodes on second-order edges define the curves, as in users' meshes.
 """
@@ -35,7 +35,7 @@ LEAST = 1e-5
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Mesh convex outlines; arguments as in `UnmeshedCell`.  Raises like `refuse_many` and `filled`."""
+    """Mesh convex outlines; arguments as in `UnmeshedCell`. Raises MeshError for too many elements or if gmsh fails."""
     field = _size_field(arrangement, sizes)
     refuse_many(field, field.least, arrangement.size)
     with gmsh_session() as gmsh:
@@ -51,7 +51,11 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
 
 
 def filled(gmsh: ModuleType, size: Float, field: SizeField, key: str, advice: str) -> MshContent:
-    """Fill the surfaces with periodic second-order triangles, sized by `field`.  If gmsh fails, raises MeshError."""
+    """Fill the surfaces in gmsh with periodic second-order triangles; return the mesh.
+
+    `size` (2,) is the cell size, and `field` gives the element sizes.  Raises MeshError if gmsh fails: the message
+    names the entry `key` of [cell] and gives `advice`.
+    """
     # Curves on the right and upper sides copy the nodes of the left and lower sides.
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -87,7 +91,7 @@ def filled(gmsh: ModuleType, size: Float, field: SizeField, key: str, advice: st
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces in the cell, in one group for each phase; return precedences by surface tag."""
+    """Add the surfaces of matrix and fibres to gmsh, in one group for each phase; return their precedences by tag."""
     occ, (curves, disc, around) = gmsh.model.occ, images(arrangement)
     assert isinstance(curves, convex_sums.ConvexSums)
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, *arrangement.size.tolist()))
@@ -110,7 +114,7 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
 
 
 def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) -> int:
-    """Add the surface of an ellipse, or of a polygon with the margin, if any; return the tag."""
+    """Add the surface of outline `number`, an ellipse or a polygon with sharp or round corners; return the tag."""
     occ, centre = gmsh.model.occ, shapes.centres[number]
     frame, core = shapes.frames[number], shapes.cores[number]
     semi_axes = np.linalg.norm(frame, axis=0)

@@ -1,4 +1,4 @@
-"""Cut the lines of a cell with discs or ellipses at crossings; all ranks then place nodes on the lines."""
+"""Cut the outlines and sides of a cell, with discs or ellipses, into lines; all ranks then place nodes on the lines."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class BareOutline:
     Attributes:
         size: (2,) width and height of the cell.
         curves, disc, around: k outlines, their fibres (k,) and surrounding outlines (k,), from `outline.images`.
-        vertices: (v, 2) line ends.
-        circle: (a,) curve of each arc.
+        vertices: (v, 2) line ends, which become nodes.
+        circle: (a,) curve of each arc, an index into `curves`.
         lines: arcs and bridges.
         field: edge sizes.
     """
@@ -46,7 +46,7 @@ class BareOutline:
     ) -> BareOutline:
         """Divide the outlines and cell sides into lines, for edges of at most `sizes`.
 
-        The `marks` become nodes. In a cell of tiles, bridges between discs are the last curves; else `bridges` is None.
+        The `marks` become nodes. The `bridges` join discs in a cell of tiles; None without tiles.
         """
         sampling, bridges = (lines.WHOLE, NO_BRIDGES) if bridges is None else (lines.IN_TILES, bridges)
         size = arrangement.size
@@ -90,7 +90,7 @@ class BareOutline:
         return cls(size, curves, disc, around, vertices, circle, SizedLines(arcs, straight, sampling), field)
 
     def outline(self, stations: LineStations) -> outline.Outline:
-        """Make the outline from nodes on arcs and bridges and matching nodes on sides; MeshError for too many nodes."""
+        """Make the outline: nodes `stations` on arcs and bridges, matching nodes on sides; MeshError for too many."""
         arcs, bridges = stations
         circle, straight = self.circle, np.full(len(self.lines.bridges), MATRIX)
         parts = [*self._sides(0), *self._sides(1)]
@@ -111,7 +111,7 @@ class BareOutline:
         return outline.Outline(nodes, replace(curves, node=number[curves.node]), ellipses, self.disc, self.around)
 
     def _sides(self, axis: int) -> Iterator[tuple[Float, Curves]]:
-        """Yield matching nodes (n, 2) and curves of both sides along `axis`; MeshError for too many nodes."""
+        """Yield nodes (n, 2) and curves of both sides along `axis`, with matching nodes; MeshError for too many."""
         places = outline.crossings(self.curves, axis, self.size)
         begin, span = places[:-1], np.diff(places)
         longest = np.full((len(span), 2), self.field.largest)
@@ -140,7 +140,7 @@ class BareOutline:
 def _arcs(
     curves: Conics, border: Float, vertices: outline.OnCircles, size: Float
 ) -> tuple[tuple[Int, Float, Float], Float, Bool]:
-    """Return arcs as `outline.arcs_within`, start points (a, 2), and the mask (a,) of points off `border` (b, 2)."""
+    """Cut curves by `arcs_within`; also return the arc starts (a, 2), and the mask (a,) of starts off `border`."""
     arcs = outline.arcs_within(curves, vertices, size)
     ends, same = curves[arcs[0]].points(arcs[1]), outline.SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

@@ -19,11 +19,11 @@ LONGEST = 10.0
 
 @dataclass(frozen=True)
 class EllipticArcs(Lines):
-    """Arcs of ellipses.
+    """Arcs of ellipses, with lengths along chords between samples.
 
     Attributes:
         ellipses: (a,) the ellipse of each arc.
-        angle, way: (a, k) parameters of samples on each arc, and arc lengths up to the samples.
+        angle, way: (a, k) parameters of k samples on each arc, and arc lengths from the start to the samples.
     """
 
     ellipses: Ellipses
@@ -33,7 +33,7 @@ class EllipticArcs(Lines):
 
     @classmethod
     def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
-        """Return the arcs of `ellipses` (a,) from `start` (a,) to `stop` (a,), with edges of at most `cap`."""
+        """Return the arcs of `ellipses` (a,) from parameters `start` (a,) to `stop` (a,), with the limit `cap`."""
         share = np.linspace(0, 1, convex_sums.POINTS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
@@ -66,7 +66,7 @@ def size_field(
     """Return the size field of a cell with ellipses; see `graded_size.size_field`.
 
     Cell sides meet the ellipses `crossed` (c,) at `crossings` (c, 2), where edges are at most R phi / WEDGE long, with
-    the angle phi between side and ellipse, and the radius of curvature R.
+    the angle phi between side and ellipse, and the radius of curvature R of the ellipse.
     """
     size, largest, inner = arrangement.size, sizes.largest, arrangement.outlines
     assert isinstance(inner, Ellipses)

@@ -34,7 +34,7 @@ Source = tuple[Float, Float, Float]
 
 
 def wrap(points: Float, size: Float) -> Float:
-    """Wrap positions (n, 2) into the cell [0, size)."""
+    """Move positions (n, 2) by whole periods into the cell [0, size)."""
     wrapped = points % size
     return np.where(wrapped >= size, 0.0, wrapped)
 
@@ -51,16 +51,16 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """Return sqrt(t a) (N,) for coatings of thickness t on discs of radius a; infinite for bare discs."""
+    """Return the longest edges (N,) on coatings: sqrt(t a) for thickness t, disc radius a; infinite for bare discs."""
     return np.where(arrangement.coated, np.sqrt(arrangement.coating * arrangement.radii), np.inf)
 
 
 def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: Sequence[Float | float]) -> list[Source]:
-    """Return the sources on both faces (k, 2) of passages, where edges are shorter than `caps`.
+    """Return sources on both faces of passages that need edges shorter than `caps`: positions, lengths, growths.
 
-    `width` and `curvature` are (k,); `caps` has a limit for each face, () or (k,). The edge length is PASSAGE_EDGE
-    times the passage width, or less if the edges on the other face are shorter. The length grows, but to at most twice
-    the width w + c s^2 / 2 at the distance s along a passage of curvature c.
+    The passages have `width` and `curvature` (k,), and points on two `faces` (k, 2); `caps` has a limit for each face,
+    () or (k,). The edge length is PASSAGE_EDGE times the width, or less if the edges on the other face are shorter. The
+    length grows, but to at most twice the width w + c s^2 / 2 at the distance s along a passage of curvature c.
     """
     growth = np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature))
     sources = []
@@ -72,7 +72,7 @@ def passages(width: Float, curvature: Float, faces: tuple[Float, Float], caps: S
 
 
 def at_vertices(vertices: Float, size: Float) -> Source:
-    """Return distinct `vertices` (v, 2) as sources; the length is the distance to the next vertex on the torus."""
+    """Return distinct `vertices` (v, 2) as sources, with the distance to the next vertex on the torus as length."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
@@ -84,13 +84,7 @@ def at_vertices(vertices: Float, size: Float) -> Source:
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """The largest edge lengths of a mesh / cell width, in descending order.
-
-    Attributes:
-        largest: length anywhere.
-        interface: length on circles.
-        tip: length at debond tips.
-    """
+    """The largest edge lengths / cell width: anywhere (`largest`), on circles (`interface`), at debond tips (`tip`)."""
 
     largest: float
     interface: float
@@ -98,14 +92,14 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: cell_section.Cell, has_tips: bool) -> MeshSizes:
-        """Return the sizes in a case / cell width; `tip` is `interface` without tips or without `tip_size`."""
+        """Return the sizes in a case; without tips or without `tip_size`, `tip` is `interface`."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
-        """Return whether the mesh is finer on circles or at tips than elsewhere.
+        """Return whether elements on circles or at tips are smaller than elsewhere.
 
-        Thin coatings and tiny discs also make the mesh finer.
+        Thin coatings and tiny discs also need smaller elements.
         """
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
@@ -119,7 +113,7 @@ class MeshSizes:
 class SizeField:
     """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) on the torus, or a smaller graded size.
 
-    Source k acts within the distance `largest` / MAX_GROWTH, where it is among the `nearest` sources.
+    Source k at x_k has the length h_k and growth g_k; the NEAREST sources within `largest` / MAX_GROWTH of x count.
 
     Attributes:
         largest: largest size.
@@ -128,7 +122,7 @@ class SizeField:
     """
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, graded: FromLines | None = None) -> None:
-        """Prepare sources on a torus with periods `size` (2,)."""
+        """Prepare the search for near `sources` on a torus with periods `size` (2,)."""
         self.largest, self.graded, self._size, self._bound = largest, graded, size, largest / MAX_GROWTH
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         # For missing neighbours, the tree returns the number of sources, an index with infinite length.
@@ -202,14 +196,14 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 class FromLines:
     """Sizes min(h_i + g d_i, h_t + g max(0, d_t - h_t)) that grow from lines and tips, with g = MAX_GROWTH.
 
-    d_i and d_t are the distances to the nearest line and to the nearest tip, h_i and h_t the edge lengths on the line
-    and at the tip. `least` is a lower bound of the sizes.
+    d_i and d_t are the distances to the nearest line and to the nearest tip, h_i and h_t the edge lengths on this line
+    and at tips. `least` is a lower bound of the sizes.
     """
 
     def __init__(
         self, size: Float, points: Float, lengths: Float, tip: float, tips: Float, circles: Float | None = None
     ) -> None:
-        """Prepare `points` (s, 2) on lines with lengths h_i (s,), and `tips` (t, 2) with the length h_t.
+        """Prepare `points` (s, 2) on lines with lengths h_i (s,), and `tips` (t, 2) with the length h_t = `tip`.
 
         The distance d_i refers to the circles (s, 3) through the points or, without circles, to the points.
         """

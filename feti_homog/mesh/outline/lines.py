@@ -27,8 +27,8 @@ class Curves:
     Attributes:
         node, first: curve k has the nodes node[first[k] : first[k + 1]], from end to end.
         circle: (c,) the circle of each curve; MATRIX for a straight line.
-        inside: (c,) the region on the left: the disc or coating within the circle, MATRIX or OUTSIDE.
-        outside: (c,) the region on the right: the coating within the surrounding circle, MATRIX or OUTSIDE.
+        inside: (c,) the region on the left: the circle around a disc or coating, MATRIX or OUTSIDE.
+        outside: (c,) the region on the right: the circle around a coating, MATRIX or OUTSIDE.
     """
 
     node: Int
@@ -56,7 +56,7 @@ class Curves:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[Float, Curves]]) -> tuple[Float, Curves]:
-        """Join the points (n, 2) and curves of all parts, and number the points through all parts."""
+        """Join the points (n, 2) and curves of all parts, and shift node numbers by the points in earlier parts."""
         begin = np.cumsum([0, *(len(points) for points, _ in parts)])
         counts = np.concatenate([np.diff(curves.first) for _, curves in parts])
         curves = cls(
@@ -68,7 +68,7 @@ class Curves:
 
 
 class Lines:
-    """The base class of c lines; each attribute is an array (c, ...).
+    """The base class of c lines, such as arcs; each attribute is an array (c, ...).
 
     Attributes:
         cap: (c, 2) longest allowed edge at both ends of each line; the limit varies linearly between the ends.
@@ -89,7 +89,7 @@ class Lines:
         return len(self.lengths)
 
     def chosen(self, some: slice) -> Self:
-        """Select a slice of the lines."""
+        """Return the lines in the slice `some`."""
         return type(self)(**{name: values[some] for name, values in vars(self).items()})
 
 
@@ -122,7 +122,7 @@ class Segments(Lines):
     """Straight lines.
 
     Attributes:
-        begin, way: (s, 2) first ends, and vectors from the first to the second ends.
+        begin, way: (s, 2) first end of each line, and vector from the first to the second end.
     """
 
     begin: Float
@@ -141,7 +141,7 @@ class Segments(Lines):
 
 @dataclass(frozen=True)
 class Sampling:
-    """The numbers of sample positions for the edge size.
+    """The numbers of sample positions for the edge size, and the limit for nodes.
 
     Attributes:
         arc, side, bridge: positions along an arc, a piece of a side and a bridge.
@@ -165,7 +165,7 @@ class Stations:
     Attributes:
         share: (n,) fraction of the line length before each node, from 0 to 1.
         first: (c + 1,) line k has the nodes first[k] : first[k + 1].
-        edges: int ds / h over all lines, with the edge size h.
+        edges: the edge count before rounding: int ds / h over all lines, with the edge size h.
     """
 
     share: Float
@@ -179,7 +179,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
-        """Concatenate the nodes of all parts, in this order.  Raises MeshError for more than `limit` edges in all."""
+        """Concatenate the nodes of all parts, in this order.  Raises MeshError for more than `limit` edges in total."""
         edges = sum(part.edges for part in parts)
         _refuse_many(edges, limit)
         counts = np.concatenate([np.diff(part.first) for part in parts])
@@ -195,9 +195,9 @@ def _refuse_many(edges: float, limit: int) -> None:
 def place_nodes(field: SizeField, lines: Lines, least_samples: int, least_edges: Int | int, limit: int) -> Stations:
     """Place nodes on lines at equal steps of the integral of ds / h, with the edge size h.
 
-    h is the size in `field`, limited by `lines.cap`. A line has at least `least_edges`, () or (c,), edges. It has
-    `least_samples` equidistant samples of h and, for graded sizes, at least SAMPLES_OF_AN_EDGE samples on each edge.
-    Raises MeshError for more than about `limit` nodes.
+    h is the size in `field`, limited by `lines.cap`, and sampled at `least_samples` equidistant positions of each line;
+    for graded sizes, also at SAMPLES_OF_AN_EDGE or more positions on each edge. Each line has at least `least_edges`
+    edges, () or (c,). Raises MeshError for more than about `limit` nodes.
     """
     lengths = lines.lengths
 
@@ -250,7 +250,7 @@ LineStations = tuple[Stations, Stations]
 
 @dataclass(frozen=True)
 class SizedLines:
-    """Arcs and bridges, with independent nodes on each line, so that ranks can divide the work."""
+    """Arcs and bridges whose nodes do not depend on other lines, so that ranks can divide the work."""
 
     arcs: Lines
     bridges: Lines
@@ -263,12 +263,12 @@ class SizedLines:
         return [SizedLines(self.arcs.chosen(slice(*a)), self.bridges.chosen(slice(*b)), self.sampling) for a, b in ends]
 
     def stations(self, field: SizeField) -> LineStations:
-        """Place the nodes on the arcs and bridges.  Raises MeshError if the sampling allows fewer nodes."""
+        """Place the nodes on the arcs and bridges.  Raises MeshError for more than `sampling.most_nodes` nodes."""
         sampling = self.sampling
         arcs = place_nodes(field, self.arcs, sampling.arc, 1, sampling.most_nodes)
         return arcs, place_nodes(field, self.bridges, sampling.bridge, 1, sampling.most_nodes)
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
-        """Concatenate the nodes of all `parts` of the lines.  Raises MeshError if the sampling allows fewer nodes."""
+        """Concatenate the nodes of all `parts`.  Raises MeshError for more nodes than `sampling.most_nodes`."""
         arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges

@@ -1,4 +1,4 @@
-"""Build the cell lines with nodes from images, vertices, arcs and pieces of sides."""
+"""Build the cell lines: images of outlines, vertices, arcs and pieces of sides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Bridges:
 
     @property
     def on_circles(self) -> OnCircles:
-        """The start points of all bridges, then the end points."""
+        """The circles (2b,) and angles (2b,) of all bridge ends: first the start points, then the end points."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
 
@@ -45,7 +45,7 @@ class Outline:
         curves: curves through the nodes.
         ellipses: k circles and ellipses in the plane, disc by disc and image by image, coating before core.
         disc: (k,) index of the fibre or void of each circle or ellipse.
-        around: (k,) index of the circle or ellipse around each one, MATRIX in the matrix.
+        around: (k,) index of the circle or ellipse that surrounds each one, MATRIX if none does.
     """
 
     points: Float
@@ -56,12 +56,12 @@ class Outline:
 
     @property
     def is_coating(self) -> Bool:
-        """The mask (k,) of circles that surround a coating."""
+        """The mask (k,) of the outer circles of rings: of coatings, and of walls of hollow fibres."""
         return np.isin(np.arange(len(self.around)), self.around)
 
 
 def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
-    """Find the outlines (k,) in the cell, their fibres (k,), and the outlines around them (k,), or MATRIX.
+    """Find the outlines (k,) in the cell, their fibres (k,), and the outline (k,) around each, MATRIX if none.
 
     Periodic images have separate entries, fibre by fibre and image by image, coating before core.
     """
@@ -84,21 +84,21 @@ def images(arrangement: Arrangement) -> tuple[Outlines, Int, Int]:
 
 
 def crossings(curves: Conics, axis: int, size: Float) -> Float:
-    """Return the ascending coordinates (k,) of corners and crossings with curves on the side through 0 along `axis`."""
+    """Find where curves cross the side from the origin along `axis`: ascending coordinates (k,), with both corners."""
     middle, half = curves.chord(axis)
     crossing = np.concatenate([middle - half, middle + half])[np.tile(half > 0, 2)]
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
 def on_side(places: Float, axis: int, level: float) -> Float:
-    """Return the points (k, 2) at coordinates `places` (k,) along `axis`, on the side at `level`."""
+    """Return the points (k, 2) of a side: coordinates `places` (k,) along `axis`, and `level` along the other axis."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points
 
 
 def curve_at(curves: Conics, points: Float) -> Int:
-    """Find the smallest curve (k,) around each point (k, 2), or MATRIX."""
+    """Find the smallest curve (k,) that contains each point (k, 2); MATRIX if no curve does."""
     beyond = curves.centres - np.clip(curves.centres, points.min(axis=0), points.max(axis=0))
     numbers = np.flatnonzero(np.linalg.norm(beyond, axis=1) < curves.longest)
     if not len(numbers):
@@ -110,7 +110,7 @@ def curve_at(curves: Conics, points: Float) -> Int:
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
-    """Find the points that lie on curves; return the curves (c,) and the points (c, 2)."""
+    """Find the points that lie on curves: return, pair by pair, the curves (c,) and the points (c, 2)."""
     close = cKDTree(points).query_ball_point(curves.centres, curves.longest * (1 + SAME_PLACE))
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
@@ -137,7 +137,7 @@ def vertex_angles(curves: Conics, name: Int, crossing: tuple[Int, Float], marks:
 
 
 def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, Float, Float]:
-    """Divide curves at `vertices` into arcs in the cell, of at most a quarter turn.
+    """Divide curves at `vertices` into arcs of at most a quarter turn, and keep arcs within the cell.
 
     Returns curves (a,), and first and last parameters (a,). The arcs of a curve without vertices begin at 0.
     """
@@ -160,7 +160,7 @@ def arcs_within(curves: Conics, vertices: OnCircles, size: Float) -> tuple[Int, 
 
 
 def tip_vertices(arrangement: Arrangement, marks: Marks, vertices: Float) -> Float:
-    """Find the vertices (t, 2) at the marks on the curves of an arrangement."""
+    """Find the vertex nearest to each mark on the curves of an arrangement: positions (t, 2)."""
     names = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     pairs = [(name, mark) for name, angles in marks.items() if name in names for mark in angles]
     name, mark = np.array([name for name, _ in pairs], np.int64), np.array([mark for _, mark in pairs])

@@ -36,13 +36,13 @@ BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 def load(path: Path) -> RawMesh:
     """Read triangles, quadrilaterals and lines from an input file with one part.
 
-    The phase of a triangle, or the curve of a line, is the set that a *SOLID SECTION names (its material, if a material
-    and no set is named matrix), else the *ELSET, else the ELSET of *ELEMENT; names become lower case unless quoted.
-    Elements have first or second order.
+    Element sets name the phases of triangles and the curves of lines: the set of a section (*SOLID SECTION, ...), else
+    the *ELSET, else the ELSET of *ELEMENT. The material names the phase if a material, but no set of a section, is
+    named matrix. Names become lower case unless quoted. Elements have first or second order.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other elements.
+        MeshError: the file is damaged, or has unusable elements.
     """
     text = input_files.read(path).decode("utf-8-sig", "replace")
     content = _Content(budget=max(MOST_MEMBERS, len(text)))
@@ -56,7 +56,7 @@ def load(path: Path) -> RawMesh:
 
 @dataclass
 class _Content:
-    """The nodes, elements and sets in the blocks of a file so far.
+    """The nodes, elements and sets in the blocks of a file so far; `take` adds a block.
 
     Attributes:
         budget: number of members that sets may still get.
@@ -78,7 +78,7 @@ class _Content:
     is_assembly: bool = False
 
     def take(self, block: KeywordBlock) -> None:
-        """Read a block of nodes, elements, sets or sections, skip others; ValueError for a refused or faulty block."""
+        """Add the nodes, elements, sets or sections of a block, or skip it; ValueError for refused or faulty blocks."""
         if block.keyword in REFUSED:
             raise ValueError(REFUSED[block.keyword])
         match block.keyword:
@@ -108,7 +108,7 @@ class _Content:
                 self.materials[name] = block.parameters.get("MATERIAL", name)
 
     def _take_elements(self, block: KeywordBlock) -> None:
-        """Read the elements of a block; ValueError for unusable types, wrong node counts and repeated numbers."""
+        """Add the elements of a block; ValueError for unusable types, wrong node counts and repeated numbers."""
         if self.is_assembly:
             raise ValueError("elements of the assembly are not read: expected all in the part")
         kind = block.parameters.get("TYPE", "").upper()
@@ -130,7 +130,7 @@ class _Content:
                 self.sets.setdefault((BY_ELEMENTS, block.parameters["ELSET"]), set()).add(tag)
 
     def _take_set(self, block: KeywordBlock) -> None:
-        """Add elements, sets or ranges (GENERATE, default step 1) to a set; ValueError if faulty or over `budget`."""
+        """Add elements, other sets or ranges (GENERATE) to a set; ValueError for faulty blocks or over `budget`."""
         members = self.sets.setdefault((BY_SET, block.parameter("ELSET")), set())
         for row in block.rows:
             parts: Iterable[Collection[int]] = (
@@ -155,7 +155,7 @@ class _Content:
         return set().union(*levels)
 
     def raw_mesh(self) -> RawMesh:
-        """Return the mesh, with triangles grouped by set names, and with sets of lines as curves.
+        """Return the mesh: triangles grouped by set names, and curves from sets of lines.
 
         Raises MeshError if triangles, nodes of elements, or sets of sections are missing.
         """
@@ -200,7 +200,7 @@ class _Content:
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
-    """Return the names of the sets of each element, without repetition."""
+    """Map each element to the names of its sets, in the order of `sets`, without repetition."""
     names: dict[int, dict[str, None]] = {}
     for name, members in sets:
         for tag in members:
@@ -209,12 +209,12 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
 
 
 def _integer(word: str) -> int:
-    """Convert a word into a whole number, as 12 or 12.0; ValueError for any other word."""
+    """Convert a word such as 12 or 12.0 into a whole number; ValueError for any other word."""
     return int(_checked(word, f"[+-]?{WHOLE}", "a whole number of at most 15 digits").partition(".")[0])
 
 
 def _checked(word: str, pattern: str, expected: str) -> str:
-    """Return a word that matches a pattern; ValueError for any other word."""
+    """Return a word if it matches a pattern; else raise ValueError, with the `expected` kind of word."""
     if not re.fullmatch(pattern, word):
         raise ValueError(f"{wording.toml_value(word)}: expected {expected}")
     return word

@@ -97,7 +97,7 @@ class KeywordBlock:
         return cls(number, word, keyword, parameters)
 
     def parameter(self, name: str) -> str:
-        """Return a parameter value; ValueError for a missing parameter."""
+        """Return the value of the parameter `name`; ValueError if the block lacks it."""
         if name not in self.parameters:
             raise ValueError(f"no {name}")
         return self.parameters[name]
@@ -150,6 +150,6 @@ def resolved(word: str) -> str:
 
 
 def name_of(word: str) -> str:
-    """Convert a name to lower case, or strip its quotation marks."""
+    """Convert a name to lower case, or strip the quotation marks of a quoted name."""
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()

@@ -43,12 +43,12 @@ Elements = tuple[Int, Int, Int]
 
 @dataclass(frozen=True)
 class MshContent:
-    """The nodes, elements and physical groups of a file.
+    """The nodes, elements and physical groups of a .msh file, or of the mesh in gmsh.
 
     Attributes:
         tags, points: (n,) and (n, 3) numbers and positions of the nodes.
         elements: elements by the name of the element type in gmsh, entity by entity.
-        groups: physical groups of each entity (dimension, number).
+        groups: numbers of the physical groups of each entity (dimension, number).
         names: names of the physical groups (dimension, number) with a name.
     """
 
@@ -77,11 +77,11 @@ class MshContent:
 
 
 def load(path: Path) -> RawMesh:
-    """Read a .msh file, and check only element types and numbers.
+    """Read a .msh file by gmsh, after a check of format and counts.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged or in another format, or has other elements than triangles, quadrilaterals and
+        MeshError: the file is damaged or in another format, or has elements that are no triangles, quadrilaterals or
             lines.
     """
     data = input_files.read(path)
@@ -130,7 +130,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """Split a file into its sections, without first and last lines, by name; OTHERS are skipped.  Raises MeshError."""
+    """Split a file into its sections: name -> text between the first and last line; skip OTHERS.  Raises MeshError."""
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
@@ -190,7 +190,7 @@ def raw_mesh(content: MshContent) -> RawMesh:
     """Convert the content of a file into triangles and curves.
 
     Raises:
-        MeshError: numbers repeat; nodes, triangles or lines of DEBONDED are missing; other element types occur.
+        MeshError: numbers repeat; nodes or triangles are missing; DEBONDED has no lines; unusable element types occur.
     """
     elements, none, faults = content.elements, np.zeros((0, 2), np.int64), list[str]()
     tags = np.concatenate([none[:, 0], *(numbers for numbers, *_ in elements.values())])

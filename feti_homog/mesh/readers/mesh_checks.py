@@ -27,12 +27,12 @@ ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """Return one fault that names the first few items; [] without items."""
+    """Return one fault: `before`, the first few items in words by `name`, and `after`; [] without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 
 def unlabelled(mesh: RawMesh) -> list[str]:
-    """List elements in no physical surface or in several surfaces."""
+    """List faults of groups: elements in no physical surface, or in several physical surfaces."""
     none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
     faults = _listed("", none, mesh.element, f": not in any {mesh.container}")
     used, first = np.unique(mesh.group, return_index=True)
@@ -44,7 +44,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
 
 
 def not_finite(mesh: RawMesh) -> list[str]:
-    """List nodes with coordinates that are not finite, or report an extreme cell size."""
+    """List nodes with coordinates that are not finite; else report a cell that is flat, too small or too large."""
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
         return _listed("", bad, mesh.node, ": coordinates are not finite")
@@ -59,7 +59,7 @@ def not_finite(mesh: RawMesh) -> list[str]:
 
 
 def not_planar(mesh: RawMesh) -> list[str]:
-    """List the first node outside the plane of node 0."""
+    """Report a mesh that is not planar, with the first node outside the plane of node 0."""
     height = mesh.points[:, 2]
     bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
     places = (f"{mesh.node(int(k))} has z = {height[k]:.9g}" for k in (*bad[:1], 0))
@@ -76,7 +76,7 @@ def flat(mesh: RawMesh) -> list[str]:
 
 
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
-    """List pairs of nodes at one position in the plane.  A list of MOST_PAIRS or more may be incomplete."""
+    """List pairs of nodes at one position in the plane.  If there are MOST_PAIRS or more, some may be missing."""
     plane = mesh.points[:, :2]
     reach = SAME_PLACE * np.ptp(plane, axis=0).max()
     column, row = ((plane - plane.min(axis=0)) // (reach / 2)).astype(np.int64).T
@@ -91,7 +91,7 @@ def duplicate_nodes(mesh: RawMesh) -> list[str]:
 
 
 def middle_nodes(mesh: RawMesh) -> list[str]:
-    """List middle nodes at wrong positions, and edges with two middle nodes."""
+    """List middle nodes at wrong positions, and edges whose triangles have different middle nodes."""
     middles, plane = mesh.middles, mesh.points[:, :2]
     if len(middles.tags) == 0:
         return []
@@ -141,7 +141,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """List nodes that lie on inner edges with a single triangle.
 
-    `plane` (n, 2) are positions in [0, `size`], exact on sides; too many candidates give only a count of the edges.
+    `plane` (n, 2) are positions in [0, `size`], exact on sides; with too many candidates, one fault counts the edges.
     """
     single = mesh.border
     inner = single[~on_sides(plane[single], size)]
@@ -163,7 +163,7 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 
 
 def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
-    """List corners of the bounding rectangle without a node."""
+    """List the corners of the cell, [0, `size`] from `origin`, where no node of `plane` (n, 2) lies."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
     missing = [at(corner + origin) for corner in bare]
@@ -172,7 +172,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
 
 
 def _nearest(plane: Float, places: Float, free: Float) -> str:
-    """Name the distance of `places` (k, 2) from nodes `free` (m, 2) of `plane` (n, 2); propose to snap unique pairs."""
+    """Write how far `places` (k, 2) are from `free` nodes (m, 2); propose "snap" if each has a near node of its own."""
     away, nearest = cKDTree(free).query(places)
     distance, step = float(away.max(initial=0.0)), cKDTree(plane).query(free[nearest], 2)[0][:, 1].min(initial=np.inf)
     is_clear = 2 * distance < step and len(np.unique(nearest)) == len(nearest)
@@ -180,7 +180,7 @@ def _nearest(plane: Float, places: Float, free: Float) -> str:
 
 
 def _snap(distance: float, plane: Float) -> str:
-    """Propose to move nodes `plane` (n, 2) by a distance onto sides and partners."""
+    """Write the advice to snap nodes, with a tolerance 10 % above `distance` / width of the mesh `plane` (n, 2)."""
     return f': repair = "snap" in [cell] moves them, with snap_tolerance = {1.1 * distance / np.ptp(plane[:, 0]):.2g}'
 
 
@@ -202,14 +202,14 @@ def cannot_debond(mesh: RawMesh, torus: Torus) -> list[str]:
 
 
 def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
-    """List all curves except DEBONDED in one line; () without such curves."""
+    """Return one remark that lists all curves except DEBONDED; () without such curves."""
     names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
     advice = f'not used; lines that are debonded from the start belong in "{DEBONDED}"'
     return tuple(_listed(f"{mesh.curve_container} ", names, str, f": {advice}"))
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List sides without inner nodes, and nodes without a partner, except on the side with fewer nodes."""
+    """List nodes without a partner, unless their side has fewer nodes, and sides without inner nodes."""
     faults = []
     for axis, side in SIDES:
         nodes, partners = (np.flatnonzero(plane[:, axis] == k * size[axis]) for k in (side, 1 - side))
@@ -235,7 +235,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """List side edges without an image on the opposite side: a void lies along the side."""
+    """List side edges that have no image because a void lies along the opposite side."""
     pairs, faults = edges(mesh.triangles), []
     for axis, side in SIDES if mesh.boundary == "periodic" else ():
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
@@ -247,7 +247,7 @@ def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
 
 
 def islands(raw: RawMesh, torus: Torus) -> list[str]:
-    """List floating mesh parts, which share no edge with the largest part."""
+    """List floating parts: mesh parts that share no edge with the largest part."""
     part = components(len(raw.triangles), *torus.sides[:2])
     loose = np.flatnonzero(part != np.bincount(part).argmax())
     first = loose[np.unique(part[loose], return_index=True)[1]]

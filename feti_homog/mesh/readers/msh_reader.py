@@ -48,12 +48,12 @@ def read(
     """Read the coarse mesh from a file, and move it to [0, width] x [0, height].
 
     The file, with a suffix in LOADERS, has triangles or quadrilaterals of first or second order, in physical surfaces
-    "matrix", "fibre", "glass", ... They fill a rectangle, except voids if the cell `has_voids`. In a periodic cell,
+    "matrix", "fibre", "glass", ... The elements fill a rectangle, except voids if `has_voids`. In a periodic cell,
     opposite sides have matching nodes. Lines in the curve "debonded" are edges between a fibre and the matrix that are
     debonded from the start. Round interfaces become circles (`with_circles`), elliptic interfaces ellipses
     (`with_ellipses`); other interfaces follow the middle nodes (`with_bent_edges`). `phases` maps phases to names and
-    numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`,
-    relative to the width, nodes first move onto sides (`snapped`). A lower `order` in the case is remarked.
+    numbers in the file (`with_phases`); messages propose the phases in `materials`. With the tolerance `snap`, relative
+    to the width, nodes first move onto sides (`snapped`). A remark reports `order` 1 for a quadratic mesh.
 
     Raises:
         MeshError: all faults of the first faulty stage: file, labels, shapes, middle nodes, connections, sides,
@@ -135,10 +135,11 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    A side lies at the median of all outer nodes within `tolerance`, relative to the width, of the outermost node. Two
+    Outer nodes within `tolerance`, relative to the width, of the outermost node move to a side at their median. Two
     nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
     move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
-    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: the checks report both.
+    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: later checks report such
+    nodes.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
@@ -169,7 +170,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """List the fault of a cell that is a parallelogram or a hexagon; [] for other cells."""
+    """Return the fault that a cell is a parallelogram or a hexagon; [] for other cells."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -188,9 +189,9 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Rename each group to the phases that select its name or number or, if none does, one of its aliases.
+    """Rename groups to the phases that select their name or number or, if none does, one of their aliases.
 
-    Other groups keep their names. The entry `debonded` selects curves.
+    Groups that no phase selects keep their names. The entry `debonded` selects curves.
 
     Raises:
         MeshError: names or numbers that no element has, or groups in two phases, one per line.
@@ -217,19 +218,19 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
 
 
 def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
-    """Look up the phases of group names in `phase_of`, with keys as from `_key`; skip unknown names and repetitions."""
+    """Return the phases of group names, once each: `phase_of` maps `_key` to the phase; other names have none."""
     return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 
 def _key(name: str | int) -> str:
-    """Convert a group name or group number for comparison without case."""
+    """Convert a group name or number into a key for comparisons that ignore case."""
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
 def unknown_phases(mesh: RawMesh, content: str, phases: Selectors, materials: Collection[str]) -> list[str]:
-    """List groups with a name that is no phase, and a missing matrix; the last fault proposes phases.
+    """List groups whose name is no phase, and a missing matrix; the last fault proposes phases for the case.
 
-    `content` lists the names in the file, `phases` are selected already; the proposal fits the names in `materials`.
+    `content` lists the names in the file, `phases` has the entries of the case so far; the proposal uses `materials`.
     """
     names = list(dict.fromkeys(chain.from_iterable(mesh.groups)))
     has_matrix = "matrix" in names

@@ -18,7 +18,7 @@ MUCH_LARGER = 2.0
 
 @dataclass(frozen=True)
 class MiddleNodes:
-    """The middle nodes on k triangle sides; a side of two triangles has two entries.
+    """The middle nodes on k triangle sides; a side between two triangles has two entries.
 
     Attributes:
         edges: (k, 2) corner nodes at the ends of each side, numbered from 0.
@@ -85,12 +85,12 @@ class RawMesh:
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
-        """Describe an element in words, with the centre position."""
+        """Describe an element in words: number and centre."""
         centre = self.points[self.triangles[number]].mean(axis=0)
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """Describe an edge in words, by both nodes."""
+        """Describe an edge in words, by number and position of its ends."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
@@ -130,7 +130,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Assemble one or more blocks of elements into one mesh of all corner nodes in use.
+    """Assemble one or more blocks of elements into one mesh; the nodes are the corner nodes in use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
@@ -177,9 +177,9 @@ def assembled(
 def in_triangles(corners: Int, points: Float) -> Int:
     """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into pairs of triangles (m, 2, 3).
 
-    Diagonals join nodes at an even number of sides from the lowest node of connected quadrilaterals, so that diagonals
-    alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal cuts if its smaller triangle
-    is MUCH_LARGER times larger or, where even and odd nodes do not alternate, just larger.  The cut depends on
+    Diagonals join nodes that are an even number of sides away from the lowest node of connected quadrilaterals, so that
+    they alternate in a grid: parallel diagonals couple stretch and shear.  The other diagonal is used if its smaller
+    triangle is MUCH_LARGER times larger or, where even and odd nodes do not alternate, just larger.  The cut depends on
     positions, not on numbers.
     """
     x, y = points[corners].T[:2]  # (4, m)

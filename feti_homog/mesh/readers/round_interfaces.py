@@ -1,4 +1,4 @@
-"""Fit circles, ellipses and arcs through middle nodes to the interface edges `pairs` (k, 2) of users' meshes."""
+"""Bend the interface edges `pairs` (k, 2) of users' meshes to circles, to ellipses, or through their middle nodes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -35,8 +35,8 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 
     A closed interface between two phases is a circle if all nodes are within ROUNDNESS_TOLERANCE radii of a circle, and
     the interface has at least MIN_CIRCLE_EDGES edges, no edge on a cell side or longer than the radius, and no cell
-    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If it cannot
-    flip, the circle stays a polygon, as do other interfaces.
+    corner. Middle nodes cut edges in two. In triangles with two edges on one circle, the third edge flips. If this edge
+    cannot flip, the circle stays a polygon, as do other interfaces.
     """
     points, circles, arcs = mesh.points.copy(), list[Ellipses](), list[Int32]()
     for classes, places, chain, loop in _closed_loops(mesh, pairs, middles, MIN_CIRCLE_EDGES):
@@ -75,10 +75,10 @@ def with_circles(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coarse
 def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> CoarseMesh:
     """Replace elliptic interfaces that are not circles by ellipses.
 
-    A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE of an ellipse, and
-    the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than 60 degrees
-    of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in two. The
-    third edge flips in triangles with two edges on one ellipse. A remark names interfaces that are only within
+    A closed interface between two phases is an ellipse if all nodes are within ROUNDNESS_TOLERANCE semi-axes of an
+    ellipse, and the interface has at least MIN_ELLIPSE_EDGES edges. An edge must not lie on a cell side, span more than
+    60 degrees of the ellipse parameter, or rise more than MOST_BENT edge lengths to its arc. Middle nodes cut edges in
+    two. The third edge flips in triangles with two edges on one ellipse. A remark lists interfaces that are only within
     NEARLY_ROUND and have no middle nodes.
     """
     nodes = len(mesh.points)
@@ -135,7 +135,7 @@ def with_bent_edges(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coa
 
 
 def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int32]) -> CoarseMesh:
-    """Add ellipses to the mesh, with the edges (a, 2) on each ellipse."""
+    """Add the ellipses `curves` to the mesh, and the edges `arcs`, an array (a, 2) for each ellipse."""
     number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
@@ -148,14 +148,14 @@ def _with_arcs(mesh: CoarseMesh, curves: Sequence[Ellipses], arcs: Sequence[Int3
 def _closed_loops(
     mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes, fewest: int
 ) -> Iterator[tuple[Int, Float, Float, list[tuple[Float, Int]]]]:
-    """Yield closed interfaces that are contractible on the torus, off the cell sides.
+    """Yield closed interfaces, off the cell sides and without branches, that are contractible on the torus.
 
     An interface has at least `fewest` edges or, with middle nodes, edge halves.
 
     Yields:
         Node classes (k,) in order, unwrapped positions (k, 2) of the classes, unwrapped positions of corner and middle
-            nodes in order, and for each image in the plane its distance (2,) to the unwrapped positions and its
-            interface edges.
+            nodes in order, and for each image in the plane the shift (2,) to the unwrapped positions and the interface
+            edges.
     """
     if len(pairs) == 0:
         return
@@ -192,7 +192,7 @@ def _closed_loops(
 
 
 def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float | None:
-    """Move points (k, 2), images of `places`, onto a circle, side nodes along sides; None if a point cannot move."""
+    """Move nodes (k, 2), unwrapped at `places`, onto a circle, side nodes along their side; None if one cannot move."""
     centres, radius = circle.centres - np.round((places - points) / size) * size, circle.frames[0, 0, 0]
     spokes = points - centres
     moved: Float = centres + radius * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -214,8 +214,8 @@ def _moved(points: Float, places: Float, circle: Ellipses, size: Float) -> Float
 def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellipses | None:
     """Fit an ellipse to an ordered closed chain of positions (k, 2).
 
-    The conic d.A.d + b.d = 1 of least squares, with d from the mean, is |F^-1 (d - c)| = 1 for the centre c and the
-    frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
+    The conic d.A.d + b.d = 1 of least squares, for offsets d from the mean, is |F^-1 (d - c)| = 1 with the centre c and
+    the frame F.  Returns None if the conic is no ellipse, or if `_distance` from the chain exceeds the tolerance.
     """
     mean = places.mean(axis=0)
     scale = np.abs(places - mean).max()
@@ -234,7 +234,7 @@ def fit_ellipse(places: Float, tolerance: float = ROUNDNESS_TOLERANCE) -> Ellips
 
 
 def _distance(ellipse: Ellipses, chain: Float) -> float:
-    """Return the largest distance / semi-axis of a closed chain (k, 2) from an ellipse; inf for steps > 60 degrees."""
+    """Return the largest distance of a closed chain (k, 2) from an ellipse in semi-axes; inf for steps over 60 deg."""
     on_circle = np.linalg.solve(ellipse.frames[0], (chain - ellipse.centres).T)
     chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
     return float(np.abs(np.hypot(*on_circle) - 1).max()) if chord.max() <= 1 else np.inf

@@ -37,12 +37,12 @@ MOST_PHASES = 10**9
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid of n points and m cells; MeshError for inconsistent arrays.
+    """A grid of n points and m cells; raises MeshError for inconsistent arrays.
 
     Attributes:
         points: (n, 3) coordinates.
         types: (m,) VTK cell types.
-        nodes: nodes of all cells, cell after cell, numbered from 0.
+        nodes: nodes of all cells in one array, cell after cell, numbered from 0.
         counts: (m,) node count of each cell.
         data: cell data, (m,) or (m, k), by name.
         first: number of the first node and the first cell in the file.
@@ -82,7 +82,7 @@ def mesh_of(grid: Grid) -> RawMesh:
     1 on initially debonded lines.  Other lines form a curve for each number or, with `phase`, a single curve `line`.
 
     Raises:
-        MeshError: the grid has other cells or no phases.
+        MeshError: the grid has unusable cells or no phases.
     """
     # Pixels, and polygons of three or four nodes, are triangles and quadrilaterals.
     counts, types, nodes, data = grid.counts, grid.types.copy(), grid.nodes.copy(), grid.data
@@ -144,7 +144,7 @@ def _other_cells(types: Int, counts: Int, first: int) -> list[str]:
 
 
 class NotANumber(ValueError):
-    """The error for a word, at `place` in a text, that is not a number."""
+    """The error for a word that is not a number, with its position `place` in the text."""
 
     def __init__(self, text: bytes, kind: str) -> None:
         wrong = WRONG_WORD[kind].search(text)
@@ -154,7 +154,7 @@ class NotANumber(ValueError):
 
 
 def numbers(text: bytes, kind: str) -> Numbers:
-    """Convert text into whole numbers (`i8`) or real numbers (`f8`).
+    """Convert text into an array (k,) of whole numbers (`i8`) or real numbers (`f8`).
 
     Raises:
         NotANumber: a word in the text is not such a number.

@@ -50,7 +50,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has unusable cells or no phases.
     """
     file = Scanner(input_files.read(path))
     if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
@@ -102,7 +102,7 @@ def _cells(file: Scanner, count: int, size: int) -> tuple[Int, Int]:
 
 
 def _arrays(file: Scanner, section: str, words: list[str], length: int) -> Iterator[tuple[str, Numbers, int]]:
-    """Yield name, values and width of arrays for `length` points or cells; skip colour tables.  Raises MeshError."""
+    """Yield name, values and width of the arrays in a section for `length` points or cells.  Raises MeshError."""
     byte = "unsigned_char" if file.is_binary else "float"
     if section == "FIELD":
         for _ in range(min(file.count(words[1]), len(file.content))):
@@ -130,7 +130,7 @@ def load_medit(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells.
+        MeshError: the file is damaged, or has unusable cells.
     """
     file = Scanner(re.sub(rb"#[^\n]*", b"", input_files.read(path)))
     if file.word() != "MeshVersionFormatted":
@@ -162,13 +162,13 @@ def load_medit(path: Path) -> RawMesh:
 
 
 class Scanner:
-    """A reader of the lines, words and arrays in a VTK file; binary arrays are big-endian."""
+    """A reader of the lines, words and arrays in a VTK or Medit file; binary arrays are big-endian."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Read the words of the next line, past blank lines and METADATA blocks; empty at the end."""
+        """Read the words of the next line, past blank lines and METADATA blocks; [] at the file end."""
         words = list[str]()
         while not words and self.place < len(self.content):
             start, self.place = self.place, self.content.find(b"\n", self.place) + 1 or len(self.content)
@@ -179,24 +179,24 @@ class Scanner:
         return words
 
     def word(self) -> str:
-        """Read the next word; empty at the file end."""
+        """Read the next word; "" at the file end."""
         match = WORD.search(self.content, self.place)
         self.place = len(self.content) if match is None else match.end()
         return "" if match is None else match[0].decode(errors="replace")
 
     def follows(self, word: str) -> bool:
-        """Return whether the next word, in capitals, is `word`."""
+        """Return whether the next word is `word`, regardless of case; the word stays unread."""
         match = WORD.search(self.content, self.place)
         return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
-        """Convert a word into a number of values; MeshError for any other word."""
+        """Convert a word into a count; MeshError unless it is a whole number of at most 15 digits."""
         if not re.fullmatch("[0-9]{1,15}", word):
             self.refuse(f"{wording.toml_value(word)}: expected a number of values")
         return int(word)
 
     def take(self, count: int, name: str) -> Numbers:
-        """Read an array (count,) of the VTK type `name`; MeshError for missing or wrong values."""
+        """Read the next `count` values of the VTK type `name`; MeshError for missing or wrong values."""
         if name.lower() not in TYPES:
             self.refuse(f"{wording.toml_value(name)}: expected a type of numbers, such as int or double")
         kind = TYPES[name.lower()]
@@ -220,6 +220,6 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError, with the number of the current line of a text file."""
+        """Raise MeshError; in text files, the message begins with the number of the current line."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")

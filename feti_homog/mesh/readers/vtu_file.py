@@ -34,7 +34,7 @@ def load(path: Path) -> RawMesh:
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: the file is damaged, or has other cells or no phases.
+        MeshError: the file is damaged, or has unusable cells or no phases.
     """
     content = input_files.read(path)
     size, start, stop, appended = len(content), content.find(b"<AppendedData"), content.rfind(b"</AppendedData>"), b""
@@ -79,7 +79,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Group the children of an XML element by tag; MeshError for unknown, missing or repeated children."""
+    """Group the children of an XML element by tag, from `tags`; MeshError for unknown, missing or repeated children."""
     children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
     other = [child.tag for child in element if child.tag not in tags]
     expected = f"expected {' and '.join(tags)}"
@@ -93,7 +93,7 @@ def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) 
 
 
 class _Arrays:
-    """A decoder of arrays in the format of an XML root, up to `budget` decompressed bytes; raises MeshError."""
+    """A decoder of the arrays in a .vtu file, limited to `budget` decompressed bytes; raises MeshError."""
 
     def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
@@ -116,7 +116,7 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Read the numeric arrays of a section: name -> (k,) or (k, width)."""
+        """Read the numeric arrays of a section: name -> (k,) or (k, width).  Raises MeshError for damaged data."""
         arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
@@ -153,7 +153,7 @@ class _Arrays:
         return int(word)
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Unpack data behind a header of lengths; ValueError or IndexError for short data, MeshError above `budget`."""
+        """Unpack data behind a header of lengths; ValueError or IndexError for short data, MeshError over `budget`."""
         header = np.frombuffer(data, self.header, len(data) // self.header.itemsize)
         count, first = (int(header[0]), 3) if self.decompressor else (1, 0)
         lengths, start, unpacked = header[first : first + count].tolist(), (first + count) * self.header.itemsize, []

@@ -3,8 +3,8 @@
 A bridge is a straight line across the matrix between the facing points of neighbouring discs, normal to both circles.
 In a narrow gap, the length of a bridge is about the edge size of the mesh, which allows good triangles.
 
-The graph nodes are the discs and the cell corners outside discs. Two half-lines represent a line, one from each end.
-A half-line leaves a disc in the direction of the start point on the circle.
+The graph nodes are the discs, and the cell corners outside discs. Each line consists of two half-lines, one from each
+end. A half-line leaves a disc in the direction of the start point on the circle.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LEAST_ANGLE = np.radians(25)
 
 @dataclass(frozen=True)
 class CentreLines:
-    """Edges of the Delaunay triangulation of the disc centres.
+    """Lines between the centres of neighbouring discs: edges of a Delaunay triangulation.
 
     Attributes:
         ends: (e, 2) circles of both discs.
@@ -49,7 +49,7 @@ class CentreLines:
 def centre_lines(circles: Float, which: Int) -> CentreLines:
     """Connect the centres of the circles `which` (n,) by a Delaunay triangulation.
 
-    Clearances above 1 + CLEAR may be too large.  Raises QhullError if all centres lie on one line.
+    `circles` is (k, 3). Clearances above 1 + CLEAR may be too large.  Raises QhullError if all centres lie on one line.
     """
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
@@ -83,8 +83,8 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     """Choose bridges among the centre lines, clear of other discs and sides.
 
     On a disc, the angle between two bridges, or between a bridge and a vertex among `vertices`, is at least
-    LEAST_ANGLE; the shorter of two close bridges stays.  Good triangles near a cell side need room: the distance from
-    the sides is more than `margin` at the ends of a bridge, and in the middle more than min(`largest`, bridge length).
+    LEAST_ANGLE; the shorter of two close bridges stays.  Good triangles near a cell side need room: bridge ends are
+    more than `margin` away, middles more than the bridge length or the element size `largest`, whichever is less.
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
@@ -132,7 +132,7 @@ class HalfLines:
 
     @classmethod
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
-        """Halve the lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
+        """Halve the lines between `nodes` (l, 2), with the end points `starts` (l, 2, 2).
 
         `centres` (n, 2) are node positions; half-lines from the second nodes come last.
         """
@@ -144,7 +144,7 @@ class HalfLines:
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
     def faces(self) -> tuple[Int, Int]:
-        """Return the next half-line (h,) around the face on the left, and the face (h,)."""
+        """Trace loops with a face on the left: return the next half-line (h,) in the loop, and the loop number (h,)."""
         order = np.lexsort((self.angle, self.node))
         place = np.argsort(order)
         first = np.searchsorted(self.node[order], self.node[order])
@@ -157,7 +157,7 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """The tiles of the matrix faces; a tile is a cell of a grid.
+    """The assignment of the matrix faces to tiles; a tile is a cell of a grid.
 
     Attributes:
         lines: half-lines that divide the matrix: side pieces, then bridges.
@@ -173,7 +173,7 @@ class MatrixTiles:
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the matrix label (k,) beside discs (k,) at angles (k,), in radians.
 
-    It is the `label` (h,) of the next half-line clockwise, or `alone` (n,), if not -1, of a disc without half-lines.
+    Discs have the label `alone` (n,) or, if it is -1, the `label` (h,) of the next half-line clockwise.
     """
     order = np.lexsort((lines.angle, lines.node))
     node, line_angle = lines.node[order], lines.angle[order]

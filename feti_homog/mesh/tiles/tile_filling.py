@@ -47,7 +47,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Filling:
-    """The triangles in a tile.
+    """The triangles that gmsh puts into a tile.
 
     Attributes:
         inner: (k, 2) inner nodes, numbered after the nodes on lines.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """The least size of cells with tiles, and the size of tiles.
+    """The least disc count of cells with tiles, and the disc count of a tile.
 
     Attributes:
         least_discs: cells with fewer discs are one tile.
@@ -46,7 +46,7 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """The assignment of all parts of a cell to tiles.
+    """The assignment of bridges, discs and matrix faces to tiles.
 
     Attributes:
         bridges: bridges on tile borders.
@@ -67,7 +67,7 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
 
 
 def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TilePolicy) -> Tiling | None:
-    """Tile a large cell with round fibres; None for other cells, or if bridges do not divide the matrix.
+    """Tile a large cell with round fibres; None for other cells, collinear centres, or too few bridges.
 
     `largest` is the element size; `marks` become nodes, which bridges avoid.
     """
@@ -118,7 +118,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Marks, policy: TileP
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[Tile]:
-    """Cut a cell with the outline `lines` into tiles.  Without a tiling, the cell is one tile."""
+    """Cut a cell with the outline `lines` into tiles; without a tiling (None), return the cell as the only tile."""
     if tiles is None:
         return [cell]
     from feti_homog.mesh.tiles import matrix_faces
@@ -159,7 +159,8 @@ class Regions:
     """The regions of a generated cell, which every rank has.
 
     Attributes:
-        width, height, scale, origin: size of the mesh, mesh lengths / lengths in tiles, lower left corner.
+        width, height, origin: size of the mesh, and its lower left corner in the coordinates of the user.
+        scale: mesh lengths / lengths in tiles.
         phases: phase names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
         constituent: (k + 1,) the constituent directly within each circle, -1 in a void; the last entry is the matrix.
@@ -186,7 +187,7 @@ class FilledTile:
     Attributes:
         number: index of the tile among all tiles.
         tile, filling: the lines with nodes; the triangles and inner nodes.
-        first: number of the first inner node.
+        first: number of the first inner node in the cell.
     """
 
     number: int
@@ -242,7 +243,7 @@ def tile_mesh(regions: Regions, tiles: Sequence[FilledTile]) -> tuple[CoarseMesh
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Make the torus of filled tiles without triangles in voids; also return the tile (m,) of each triangle.
+    """Make the torus of filled tiles, except for triangles in voids; also return the tile (m,) of each triangle.
 
     `all_nodes` is the node count in the cell.
     """

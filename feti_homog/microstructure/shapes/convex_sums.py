@@ -31,7 +31,7 @@ class ConvexSums(ConvexCurves):
 
     @property
     def radii(self) -> Float:
-        """The radii (k,) of discs with the area A + P r + pi r^2 (Steiner); core area A, perimeter P, r^2 = |det F|."""
+        """The radii (k,) of discs with the area A + P r + pi r^2 (Steiner): core area A, perimeter P, r^2 = |det F|."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -40,18 +40,18 @@ class ConvexSums(ConvexCurves):
 
     @property
     def longest(self) -> Float:
-        """Upper bounds (k,) on the distances between points and centres."""
+        """Upper bounds (k,) on the distances from the centres to the points of the outlines."""
         core = np.linalg.norm(self.cores, axis=2).max(axis=1)
         return np.asarray(core + np.linalg.norm(self.frames, axis=1).max(axis=1))
 
     @property
     def extents(self) -> Float:
-        """The extents (k, 2, 2) along the axes, backwards and forwards."""
+        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
         axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
         return self.support(axes).reshape(-1, 2, 2)
 
     def grown(self, thickness: Float) -> ConvexSums:
-        """Return the outlines enlarged by rings of thickness (k,)."""
+        """Return the outlines enlarged by rings of `thickness` (k,), with rounded corners."""
         frames, some = self.frames.copy(), thickness > 0
         is_sharp = some & ~frames.any(axis=(1, 2))
         frames[is_sharp] = thickness[is_sharp, None, None] * np.eye(2)
@@ -80,14 +80,14 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return distances (n, k) of places at `offsets` (n, k, 2) from centres to the nearest of POINTS points."""
+        """Return distances (n, k) from about POINTS outline points to points at `offsets` (n, k, 2) from centres."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(vectors[which] - points, axis=1), first) for vectors in offsets]
         return np.stack(each)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, q, 2) with the outward normals n (k, q, 2)."""
+        """Return the points (k, q, 2) of the outlines where the outward unit normals are n (k, q, 2)."""
         corner = np.einsum("kmi,kqi->kqm", self.cores, normal).argmax(axis=2)
         turned = np.einsum("kij,kqi->kqj", self.frames, normal)
         length = np.linalg.norm(turned, axis=2, keepdims=True)
@@ -96,7 +96,7 @@ class ConvexSums(ConvexCurves):
         return np.asarray(self.centres[:, None] + core + round_part)
 
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
-        """Return q points along all outlines (q, 2), unit normals (q, 2), and outline numbers (q,).
+        """Return q points along all outlines (q, 2), outward unit normals (q, 2), and outline numbers (q,).
 
         Normals have `count` equidistant directions; points on straight sides are at most perimeter / count apart.
         """
@@ -128,7 +128,7 @@ class PolygonalRows:
     columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
-        """Return the mask (N,) of rows with sides."""
+        """Return the mask (N,) of rows whose `sides` are not 0."""
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
@@ -142,7 +142,7 @@ class PolygonalRows:
             yield given & (np.nan_to_num(rows[name]) > 0), f"has sides and {name}; give one"
 
     def outlines(self, rows: Columns, centres: Float) -> ConvexSums:
-        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
+        """Build rounded polygons about `centres` (k, 2) from table rows (k,) with this shape."""
         sides, radius = np.maximum(rows["sides"].astype(np.intp), SIDES[0]), rows["radius"]
         rounding = rows["corner"] * radius * np.cos(np.pi / sides)
         # The centres of the rounding circles are the corners of the core.

@@ -1,4 +1,4 @@
-"""Represent discs, and ellipses as affine images of the unit circle: points, tangents, curvature, distances."""
+"""Represent discs and ellipses, affine images of the unit circle: points, tangents, curvature, distances."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ THINNEST = 0.05
 
 @dataclass(frozen=True)
 class Ellipses(ConvexCurves):
-    """k ellipses c + F p with |p| = 1; `centres` c (k, 2), `frames` F (k, 2, 2)."""
+    """k ellipses of points c + F p with |p| = 1; `centres` c (k, 2), `frames` F (k, 2, 2)."""
 
     frames: Float
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Build ellipses with semi-axes a, b (k,); a has the direction `angle` (k,), in degrees."""
+        """Build ellipses about `centres` (k, 2) with semi-axes a, b (k,); a has the direction `angle` (k,), degrees."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """Build ellipses from circles (k, 3) of centre and radius."""
+        """Build ellipses with equal semi-axes from circles (k, 3) of centre and radius."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
@@ -42,7 +42,7 @@ class Ellipses(ConvexCurves):
 
     @property
     def cores(self) -> Float:
-        """The cores (k, 1, 2): the origin."""
+        """The cores (k, 1, 2) of `ConvexCurves`: the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
@@ -52,11 +52,11 @@ class Ellipses(ConvexCurves):
 
     @property
     def extents(self) -> Float:
-        """The extents (k, 2, 2) along the axes, backwards and forwards."""
+        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
         return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Return the ellipses with both semi-axes, the columns of F, longer by `thickness` (k,)."""
+        """Return the ellipses with both semi-axes longer by `thickness` (k,); the columns of F must be semi-axes."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -74,36 +74,36 @@ class Ellipses(ConvexCurves):
 
     @property
     def semi_axes(self) -> Float:
-        """The lengths (k, 2) of the semi-axes, if the columns of F are the semi-axes."""
+        """The lengths (k, 2) of the columns of F, which must be semi-axes."""
         return np.asarray(np.linalg.norm(self.frames, axis=1))
 
     @property
     def perimeters(self) -> Float:
-        """The perimeters (k,) by Ramanujan's second formula, too small by at most 0.04 %."""
+        """The perimeters (k,) by Ramanujan's second formula, too small by at most 0.04 %; see `semi_axes`."""
         a, b = self.semi_axes.T
         h = 3 * ((a - b) / (a + b)) ** 2
         return np.asarray(np.pi * (a + b) * (1 + h / (10 + np.sqrt(4 - h))))
 
     @property
     def angles(self) -> Float:
-        """The angles (k,) from x to the first semi-axis, in degrees."""
+        """The angles (k,) from the x axis to the first column of F, a semi-axis, in degrees."""
         return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
 
     @property
     def longest(self) -> Float:
-        """The longer semi-axes (k,)."""
+        """The longer semi-axis (k,) of each ellipse; see `semi_axes`."""
         return np.asarray(self.semi_axes.max(axis=1))
 
     def points(self, angle: Float) -> Float:
-        """Return the points (k, 2) c + F (cos t, sin t) at parameters t (k,)."""
+        """Return the points c + F (cos t, sin t) (k, 2) of the ellipses at parameters t (k,)."""
         return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
 
     def unit(self, offsets: Float) -> Float:
-        """Map vectors d (k, 2) to F^-1 d (k, 2), where the ellipses are unit circles."""
+        """Map vectors d (k, 2) to coordinates F^-1 d (k, 2) in which the ellipses are unit circles."""
         return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the parameters (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
+        """Return the parameters t (k,) where rays from the centres along d (k, 2) intersect the ellipses."""
         unit = self.unit(offsets)
         return np.arctan2(unit[:, 1], unit[:, 0])
 
@@ -112,10 +112,10 @@ class Ellipses(ConvexCurves):
         return self.parameter(directions(angle))
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`.
+        """Return middles (k,) and half lengths (k,) of the chords that ellipses cut from the coordinate `axis`.
 
-        An ellipse that does not intersect the axis has the half length 0.  The points d = x - c, with a known
-        component v, satisfy d . (F F^T)^-1 d = 1.
+        An ellipse that does not intersect the axis has the half length 0.  The points d = x - c, with a known component
+        v, satisfy d . (F F^T)^-1 d = 1.
         """
         inverse, other = np.linalg.inv(self.squares), 1 - axis
         v = -self.centres[:, other]
@@ -134,21 +134,21 @@ class Ellipses(ConvexCurves):
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Return approximate distances ||F^-1 d| - 1| sqrt|det F| (n, k) of points at d (n, k, 2) from the centres."""
+        """Return distances (n, k) of points at d (n, k, 2) from the centres, about ||F^-1 d| - 1| sqrt|det F|."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
-        """Return the points (k, 2) with the outward unit normals n (k, 2)."""
+        """Return the points (k, 2) of the ellipses where the outward unit normals are n (k, 2)."""
         along = np.einsum("kij,kj->ki", self.squares, normal)
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
     def bend(self, normal: Float) -> Float:
-        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) at normals n (k, 2)."""
+        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) where the outward unit normals are n (k, 2)."""
         return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
 
     def normal(self, angle: Float) -> Float:
-        """Return the outward unit normals (k, 2) at parameters (k,)."""
+        """Return the outward unit normals (k, 2) at the parameters t (k,) of `points`."""
         across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
@@ -170,7 +170,7 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
 
 
 class EllipticRows:
-    """The shape of table rows that have semi-axes in place of a radius."""
+    """The shape of table rows with two different semi-axes a and b."""
 
     name, sizes, has_tips = "ellipses", ("a", "b"), True
     columns = MappingProxyType(
@@ -189,7 +189,7 @@ class EllipticRows:
         yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
 
     def outlines(self, rows: Columns, centres: Float) -> Ellipses:
-        """Build the outlines of rows (k,) with this shape about centres (k, 2)."""
+        """Build ellipses about `centres` (k, 2) from table rows (k,) with this shape."""
         return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])
 
 
@@ -201,12 +201,12 @@ class Discs(ConvexCurves):
 
     @property
     def cores(self) -> Float:
-        """The cores (k, 1, 2): the origin."""
+        """The cores (k, 1, 2) of `ConvexCurves`: the origin."""
         return np.zeros((len(self), 1, 2))
 
     @property
     def circles(self) -> Float:
-        """The centres and radii (k, 3)."""
+        """The centres and radii (k, 3) of the discs."""
         return np.column_stack([self.centres, self.radii])
 
     @property
@@ -216,12 +216,12 @@ class Discs(ConvexCurves):
 
     @property
     def longest(self) -> Float:
-        """The radii (k,), which bound the distances between points and centres."""
+        """The radii (k,), as bounds on the distances from the centres to the points."""
         return self.radii
 
     @property
     def extents(self) -> Float:
-        """The extents (k, 2, 2) along the axes: the radii."""
+        """The extents (k, 2, 2) from the centres along both axes: the radii."""
         return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
 
     def grown(self, thickness: Float) -> Discs:
@@ -229,38 +229,38 @@ class Discs(ConvexCurves):
         return replace(self, radii=self.radii + thickness)
 
     def points(self, angle: Float) -> Float:
-        """Return the points (k, 2) at parameters (k,), which are angles in radians."""
+        """Return the points (k, 2) of the circles at angles (k,) in radians."""
         return on_circle(self.circles, angle)
 
     def unit(self, offsets: Float) -> Float:
-        """Map vectors d (k, 2) to d / r (k, 2), where the discs are unit discs."""
+        """Map vectors d (k, 2) to coordinates d / r (k, 2) in which the discs are unit discs."""
         return np.asarray(offsets / self.radii[:, None])
 
     def parameter(self, offsets: Float) -> Float:
-        """Return the angles (k,) of vectors d (k, 2), in radians."""
+        """Return the angles (k,) of vectors d (k, 2), in radians: parameters of `points`."""
         return np.arctan2(offsets[:, 1], offsets[:, 0])
 
     def parameter_at(self, angle: Float) -> Float:
-        """Return the parameters (k,) at angles (k,), which are the angles themselves."""
+        """Return the parameters (k,) at polar angles (k,): the angles themselves, in radians."""
         return angle
 
     def chord(self, axis: int) -> tuple[Float, Float]:
-        """Return the middles (k,) and half lengths (k,) of the chords on the coordinate `axis`."""
+        """Return middles and half lengths (k,) of the chords that discs cut from the coordinate `axis`; 0 if none."""
         return self.centres[:, axis], np.sqrt(np.maximum(self.radii**2 - self.centres[:, 1 - axis] ** 2, 0.0))
 
     def support(self, normal: Float) -> Float:
-        """Return the radii (k, ...), the supports in all directions."""
+        """Return the supports (k, ...) at unit vectors n (k, ..., 2): the radii."""
         radii = np.expand_dims(self.radii, axis=tuple(range(1, normal.ndim - 1)))
         return np.broadcast_to(radii, normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Separate pairs along the vectors between centres, or along x for zero vectors; see `ConvexSums.parting`."""
+        """Return directions between centres, or x if centres coincide, and radius sums; see `ConvexSums.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]
 
     def distances(self, offsets: Float) -> Float:
-        """Return the distances (n, k) between circles and points at vectors (n, k, 2) from the centres."""
+        """Return the distances (n, k) between circles and points at `offsets` (n, k, 2) from the centres."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))
 
 

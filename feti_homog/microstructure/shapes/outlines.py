@@ -26,7 +26,7 @@ class ConvexCurves:
         cores: (k, m, 2) corners of the hull V about the centres; the origin for outlines without a core.
         frames: (k, 2, 2) frames F.
         radii: (k,) radii of equal-area discs.
-        longest: (k,) upper bounds on the distances between points and centres.
+        longest: (k,) upper bounds on the distances from the centres to the points of the curves.
         extents: (k, 2, 2) extents from the centre along the two axes, backwards and forwards.
     """
 
@@ -39,7 +39,7 @@ class ConvexCurves:
         return self._each(lambda array: array[rows])
 
     def at(self, centres: Float) -> Self:
-        """Return the curves at other centres (k, 2)."""
+        """Return the curves moved to other centres (k, 2)."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Self:
@@ -55,18 +55,18 @@ class ConvexCurves:
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:
-        """Append other curves.  The cores of all curves must have equally many corners."""
+        """Return these curves followed by `others`.  The cores of all curves must have equally many corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
-        """Apply a function, field by field, to this object and other curves."""
+        """Apply a function, field by field, to this object and other curves; return the new curves."""
         curves = (self, *others)
         values = [function(*(getattr(each, field.name) for each in curves)) for field in fields(self)]
         return type(self)(*values)
 
 
 class ColumnRange(NamedTuple):
-    """The numbers in a table column: value of an empty cell, and lower bounds, inclusive and exclusive."""
+    """The numbers in a table column: value of an `empty` cell, inclusive bound `least`, exclusive bound `above`."""
 
     empty: float
     least: float = -np.inf

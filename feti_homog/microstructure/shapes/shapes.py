@@ -24,12 +24,12 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """Return the shapes in a table that allow mesh nodes at tips; without `has_tips`, all other shapes in the table."""
+    """Return the shapes in a table whose outlines allow mesh nodes at tips or, without `has_tips`, do not."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
 def columns_without_tips(rows: Columns) -> dict[str, Float]:
-    """Return the columns (N,) that shapes without tip nodes use, by name; NaN in rows of other shapes."""
+    """Return the columns (N,), by name, of shapes without nodes at tips; NaN in rows of other shapes."""
     shapes = given_shapes(rows, has_tips=False)
     mask = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
     names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
@@ -43,7 +43,7 @@ def have_both_sizes(rows: Columns) -> Bool:
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """Build the outlines of N valid rows, without coatings."""
+    """Build the outlines of N table rows without faults; coatings are not included."""
     centres = np.column_stack([rows["x"], rows["y"]])
     radius = np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"])
     parts: list[tuple[Bool, Outlines]] = []
@@ -55,7 +55,7 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Replace parts of N outlines.
+    """Replace the outlines in masked rows of N outlines.
 
     A part is a mask (N,) and the new outlines of the masked rows.  Returns `outlines` if all masks are empty, `Discs`
     or `Ellipses` if the class can represent all outlines, else `ConvexSums`.
@@ -77,7 +77,7 @@ def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Ou
 
 
 def elliptic(outlines: Outlines) -> Ellipses:
-    """Replace outlines other than ellipses by equal-area discs."""
+    """Return outlines as ellipses: discs and ellipses exactly, others as equal-area discs."""
     has_core = outlines.cores.any(axis=(1, 2), keepdims=True)
     return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
 
