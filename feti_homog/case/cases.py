@@ -127,12 +127,12 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase; "fibre:2" without a section has the material "fibre".  Raises KeyError."""
+        """Return the material of a phase, for "fibre:2" without a section the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property
     def fewer_events(self) -> str:
-        """Return the end of a message: advice for fewer events on a damage path; empty for other cases."""
+        """Return advice to reduce the events of a softening law, as the end of a message; else an empty string."""
         has_events = self.path is not None and self.path.method == "events"
         if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
             return ""
@@ -184,7 +184,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.  Raises OSError if a file of [cell] is unreadable.
 
-        Name, PETSc options and max_events are left out, also [output] without `with_output`; files count by content.
+        Left out: name, PETSc options, max_events and, without `with_output`, all of [output].  Files count by content.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
@@ -270,13 +270,13 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
 @lru_cache
 def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str | None], ...]) -> list[Rule]:
-    """Select the rules for the document and the sections `names` with conditions that `selected` meets."""
+    """Return the rules on the document or the sections `names` whose conditions all hold for the `selected` values."""
     rules = (rule for rule in RULES if not rule.path or rule.path[0] in names)
     return [rule for rule in rules if all(condition.holds(dict(selected)) for condition in rule.when)]
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section into a dataclass, with defaults if it may be absent; None if faulty or missing."""
+    """Read a section into a dataclass; None if it is faulty.  An absent section gives defaults or, if needed, None."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

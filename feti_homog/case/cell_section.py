@@ -274,5 +274,5 @@ class Cell:
 
     @property
     def has_own_mesh(self) -> bool:
-        """Return whether the user provides the mesh, or an image of it."""
+        """Return whether the user provides a mesh, or an image that becomes the mesh."""
         return self.geometry in ("mesh", "pixels")

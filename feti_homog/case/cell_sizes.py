@@ -1,4 +1,4 @@
-"""Derive fibre counts, cell width, element order and element size from a cell section.
+"""Derive fibre counts, cell width, element order and element size from the section [cell].
 
 Each fibre phase has a fraction, `mix`, and a radius, `radii`.  If the cell gives an accuracy, element order and size
 follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
@@ -24,7 +24,7 @@ ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
-    """Return whether elements of an order are mixed elements for a material in a plane state."""
+    """Return whether elements of `order` are mixed: quadratic, of isotropic material, in a plane state that locks."""
     return order == 2 and voigt.PLANE_STATES[plane].locks and laws.isotropic_ratio(material) is not None
 
 
@@ -76,10 +76,10 @@ def sized(
     """Return the cell with mesh size, refinement and element order that follow from its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
-    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Without an accuracy, only the
-    order is set, to 2 if linear elements lock. Faults are added to `faults`: r above MOST_REFINED, and a locking order.
-    The coarsest elements have half the fibre distance of a square lattice with this fibre count, to two digits, and at
-    most half the width: with smaller elements at circles and gaps, coarser meshes hardly have fewer elements.
+    `coarse_error` / 4^(p r) <= eps. Unless `table` gives an order, the order with fewer nodes, about p^2 4^r, is taken.
+    Without an accuracy, only the order is set: by `table`, else 2 if linear elements lock, else 1. Faults are added to
+    `faults`: r above MOST_REFINED, and a locking order. The coarsest elements have half the fibre distance of a square
+    lattice with this fibre count, to two digits, and at most half the width: circles and gaps need no larger ones.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -117,7 +117,7 @@ def default_size(cell: Cell) -> list[str]:
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return fibre count and height / width of a cell without a user mesh; all rows of a table count."""
+    """Return fibre count and height / width of a cell without a user mesh; tables need a size, and all rows count."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width
@@ -126,7 +126,7 @@ def fibres_and_height(cell: Cell) -> tuple[int, float]:
 
 
 def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:
-    """Estimate the relative strain energy error on the coarsest mesh from above.
+    """Estimate an upper bound of the relative strain energy error on the coarsest mesh.
 
     The estimate is C_p kappa max s beta^2 with beta = |lambda - 1| / (lambda + 1) and C_p = COARSE_ERROR of `order` p.
     lambda are the eigenvalues of a phase stiffness relative to the stiffness around the phase, 0 at free faces; s is
@@ -159,7 +159,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
     A phase with fraction c_p and radius r_p has the expected number e_p ~ c_p / r_p^2. Each phase gets one fibre, and
     each further fibre goes to the phase with the largest e_p / (2 n_p + 1), where n_p is its number so far: the method
-    of Sainte-Lague, which rounds all e_p to whole numbers with the given sum.
+    of Sainte-Lague, which rounds all e_p to whole numbers with the rounded sum of all e_p.
     """
     expected = _expected_counts(cell)
     count = max(len(expected), round(fsum(expected.values())))
@@ -185,7 +185,7 @@ def fractions_in_words(cell: Cell) -> str:
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Return the cell width, or None if it follows from `fibre_radius` or is the default.
+    """Return the width W of the cell, or None if it follows from `fibre_radius` or is the default.
 
     With radii and a fibre count, W^2 = sum n_p pi r_p^2 / sum c_p, with symbols as in `fibre_counts`.
     """

@@ -69,7 +69,7 @@ WAYPOINTS = types.list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Complete the loads of a path: name -> value for every component.
+    """Complete the loads of a path: return, for each load, name -> value for every component.
 
     In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
     the previous load; before the first load, all stresses are zero.
@@ -115,7 +115,7 @@ class AnalysisSection:
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Return the successive openings of all arcs; empty if each arc has its own angle."""
+        """Return the successive openings, in degrees, that all arcs share; () if each arc has its own angle."""
         return ()
 
     @property
@@ -124,7 +124,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for a number of unit `loads`; one-sided contact needs both signs."""
+        """Return the number of solves for as many unit loads as `loads`; one-sided contact needs both signs of each."""
         return 2 * loads if one_sided else loads
 
 
@@ -154,7 +154,7 @@ class Angle(AnalysisSection):
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Return the successive openings of all arcs."""
+        """Return the successive openings of all arcs, in degrees."""
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:

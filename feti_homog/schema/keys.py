@@ -41,7 +41,7 @@ class Condition:
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition in a message about `section`: key = A or B, with [other] before a key from elsewhere."""
+        """Write the condition, key = A or B, for a message about `section`; [other] precedes another section's key."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
