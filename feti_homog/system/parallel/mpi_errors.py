@@ -55,7 +55,7 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
 
 
 def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
-    """Return the result, or raise like `agree`.  Collective."""
+    """Return the result of this rank or, if any rank has an error, raise like `agree`.  Collective."""
     messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
     if messages:
         if error is not None and not isinstance(error, FetiHomogError | MemoryError):

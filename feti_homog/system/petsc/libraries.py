@@ -19,7 +19,7 @@ H5PY = "install the Debian packages python3-h5py and python3-h5py-mpi, or load y
 
 
 def require() -> None:
-    """Import mpi4py, petsc4py and h5py, which starts MPI but not PETSc.
+    """Import mpi4py, petsc4py and h5py; this starts MPI but not PETSc.
 
     Raises:
         LibraryError: a library is missing, broken or without MPI; one line for every library, with the remedy.

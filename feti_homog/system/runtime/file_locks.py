@@ -109,7 +109,7 @@ class Lock:
 
 
 def _is_taken(file: int, kind: int) -> bool:
-    """Lock an open file with flock's `kind`; return False if another process has the lock, else raise OSError."""
+    """Return True after locking an open file by flock's `kind`, False if another process has it.  Raises OSError."""
     try:
         fcntl.flock(file, kind | fcntl.LOCK_NB)
     except OSError as error:
