@@ -79,9 +79,9 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
-    """Return the material of a result with stiffness and expansion as computed.
+    """Return the material of a result as computed, with its components renumbered to card axes.
 
-    Shears are uncoupled, and the material orthotropic, if their couplings and expansions are within NEGLIGIBLE.
+    If the couplings and expansions of shears are all within NEGLIGIBLE, they are set to 0: the material is orthotropic.
     Raises CaseError if the result has no linear spatial stiffness, or did not converge; KeyError, TypeError or
     ValueError if it is damaged.
     """
@@ -200,7 +200,7 @@ def number(value: float) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert a name to at most 60 letters, digits and single underscores.
+    """Convert a name to at most 60 letters, digits and single underscores, for other characters.
 
     The prefix `material_` comes before an identifier that does not begin with a letter.
     """

@@ -55,7 +55,7 @@ def abaqus(
     """Return the Abaqus card, with the keywords *MATERIAL, *ELASTIC and *EXPANSION.
 
     An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.  `shears` (6,)
-    multiplies the strains with engineering shears.
+    are factors from engineering shears to the shears of the card.
     """
     lines = effective_material.comments(material, "**")
     lines.append(f"*MATERIAL, NAME={effective_material.identifier(material.name)}")

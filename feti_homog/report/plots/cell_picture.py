@@ -35,7 +35,7 @@ FLAT = 0.02  # standard deviation in each phase / largest stress, below which co
 
 
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the materials of the cell with the fibre numbers.
+    """Draw the materials of the cell with the fibre numbers and the initially debonded arcs.
 
     The figure also has the strength factors of the fibres if a factor is not 1.
     """
@@ -155,7 +155,7 @@ def _title(attributes: Any, text: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write the fibre numbers onto the drawn fibres.  More than 2000 fibres get none.
+    """Write the fibre numbers onto the drawn fibres; write nothing in a cell of more than 2000 fibres.
 
     The cell sides may cut a round fibre; every part of the fibre then gets the number.
 

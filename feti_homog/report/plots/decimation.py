@@ -1,6 +1,6 @@
-"""Read the mesh of result.h5, coarsened for pictures, and its fields.
+"""Read the mesh and the fields of result.h5, coarsened for pictures.
 
-The coarse mesh has at most TRIANGLE_LIMIT triangles where the nesting allows; the file is read in blocks.
+Refinements are undone until at most TRIANGLE_LIMIT triangles are left, if possible; the file is read in blocks.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # the quarter
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """The triangles of a picture: file triangles, or coarse triangles of `group` file triangles."""
+    """The q triangles and p nodes of a picture: file triangles, or coarse triangles of `group` file triangles."""
 
     block: int  # rows of a table read at once
     group: int
@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Number the distinct positions in each body, for all nodes (p,).  Torn nodes share a number."""
+        """Return a position number for each node (p,), equal for coincident nodes of one body, torn by cuts."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
@@ -102,9 +102,9 @@ def node_means(values: Array, drawn: DrawnMesh) -> Array:
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
-    """Return the outline edges (e, 2) of the triangles with equal labels.
+    """Return the edges (e, 2) that bound each group of triangles with an equal `label` (q,).
 
-    An edge between two labels occurs once on either side.  Nodes are torn, so an edge with one triangle is on a
+    An edge between two groups occurs once on either side.  Nodes are torn, so an edge with one triangle is on a
     subdomain border; the edge has a coincident twin across that border, but no twin on the cell border.
     """
     edges = np.concatenate([drawn.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])

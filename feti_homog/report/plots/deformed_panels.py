@@ -78,7 +78,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in state `number`, with its nodes at `moved` (p, 2).
 
-        Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
+        Returns the coloured triangles.  The end of a path has its own colours if its stresses double the earlier ones.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         norm = Normalize(norm.vmin, norm.vmax)  # a shared one would call the artists of earlier frames
@@ -238,7 +238,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 
 def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
-    """Write the states along a path to `path` as an animated GIF.  All frames have the layout of the last state."""
+    """Write the states along a load path to the file `path` as an animated GIF, all frames in the last one's layout."""
     numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
@@ -263,7 +263,7 @@ def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the lower left and upper right corners around all states, with a margin."""
+    """Return the lower left and upper right corners around the node positions (p, 2) of all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

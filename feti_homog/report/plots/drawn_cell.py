@@ -141,7 +141,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
     """Add a colour bar for `shapes` to the right of the axes; return the bar.
 
-    The bar is 1/25 of the longer side of the cell wide, as high as the cell, and at least 1/4 of the longer side high.
+    The bar is as high as the cell, and at least 1/4 of the longer cell side; its width is 1/25 of the longer side.
     """
     figure: Any = axes.figure
     sides: Any = axes.dataLim.size

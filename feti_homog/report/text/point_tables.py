@@ -41,7 +41,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Tabulate stresses or stiffnesses at up to `limit` angles (None: all), with node counts unless (6, 6)."""
+    """Return a table of stresses or stiffnesses at up to `limit` angles (None: all), with node counts in the plane."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -142,7 +142,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return [table of the largest G by angle and load]; [] without tips.  A single load's table has all rates."""
+    """Return a list with a table of the largest G by angle and load, for one load with all rates; [] without tips."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

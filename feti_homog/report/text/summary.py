@@ -267,7 +267,7 @@ def _stress_error(document: Document) -> list[str]:
 
 
 def _states(document: Document, count: int) -> Sequence[int]:
-    """Return the numbers of the states in the tables of phase stresses."""
+    """Return which of `count` states tables of phase stresses show: a curve's at some POINTS points, otherwise all."""
     if "path" in document and "states" in document:
         from feti_homog.results import landmarks  # only paths have landmarks
 
