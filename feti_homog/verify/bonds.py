@@ -47,7 +47,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Describe a break under the traction (1, c), with the keys of envelope points."""
+        """Return the numbers that describe a break under the traction (1, c), by the keys of envelope points."""
 
     def jumps(self, traction: Float) -> Float:
         """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
@@ -151,7 +151,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
     """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,), if not None, softens the law.  With several sections or scattered strengths, its numbers are (p,).
+    `damage` (k,), if not None, softens the law.  With several sections or scattered strengths, the constants are (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}

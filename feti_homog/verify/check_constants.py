@@ -18,7 +18,7 @@ RATIOS = ("eta", "anisotropy", "deviation")
 
 
 def check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Check tolerances of checks and contact, and that the status follows from checks, solver reasons and faults."""
+    """Check the tolerances, and that the status follows from checks, convergence reasons of the solver and faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
     # A tolerance from the command line is in no other entry, so that no law can check it.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
@@ -36,7 +36,8 @@ def check_status(findings: Findings, cell: DiscreteCell) -> None:
 def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that stiffnesses are symmetric, and that the thermal stress S obeys Levin's formula.
 
-    It is S : E = -<alpha : L : eps> under a strain E.  Debonded cells with contact have no reciprocity and are skipped.
+    S : E = -<alpha : L : eps> with the strains eps under E, expansions alpha and stiffnesses L of the phases.  Debonded
+    cells with contact have no reciprocity and are skipped.
     """
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):

@@ -88,7 +88,7 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state with cohesive tractions, whose large `FIELDS` are empty arrays, so that all states fit in memory.
+    """A state whose `traction` is cohesive and whose large `FIELDS` are empty arrays, so that all states fit in memory.
 
     Attributes:
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.

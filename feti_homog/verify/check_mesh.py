@@ -197,7 +197,7 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check rates G = G_I + G_II + G_III, tan^2 psi = (G_II + G_III) / G_I, and places and lengths of tips."""
+    """Check release rates G = G_I + G_II + G_III, modes tan^2 psi = (G_II + G_III) / G_I, and places of crack tips."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre"
     G, opening, shear, psi, length, angle, number = (np.array(tips[name]) for name in names)

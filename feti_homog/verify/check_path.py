@@ -130,10 +130,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json by superposing the states under the unit loads.
-
-    Debonded nodes, and tips that break by energy release, have no utilisation.
-    """
+    """Check the onsets in `envelope` by superposing the unit loads; debonded and released nodes have no utilisation."""
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release

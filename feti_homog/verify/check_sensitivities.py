@@ -171,7 +171,7 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """Compute <sigma_j : eps_i> plus springs, (v, v) or (6, 7), of strain states i and all states j, for a `case`."""
+    """Compute <sigma_j : eps_i> plus springs, (v, v) or (6, 7), of strain states i and all states j for a `case`."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)

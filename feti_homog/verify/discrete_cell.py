@@ -167,7 +167,7 @@ class DiscreteCell:
         return np.asarray(angle + 360.0 * (angle <= -180.0 + ROUNDING))
 
     def in_axes(self, vectors: Float) -> Float:
-        """Transform vectors (k, c) from normal, tangential (-n2, n1), axial to x1, x2, x3 components."""
+        """Transform vectors (k, c) from components along normal n, tangent (-n2, n1) and fibre to x1, x2 and x3."""
         n1, n2 = self.files.interface.normal.T
         normal, tangential, *axial = vectors.T
         return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)

@@ -151,7 +151,7 @@ class Elements:
 
 @cache
 def quadrature_points() -> Float:
-    """Return points (6, 3), the cycles of (1 - 2 b, b, b): 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
+    """Return barycentric points (6, 3), cycles of (1 - 2 b, b, b): 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
     spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
     for sign in (1.0, -1.0):
         b = (8 - np.sqrt(10.0) + sign * spread) / 18

@@ -60,7 +60,7 @@ class Cohesive(QuadraticStrength):
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """Compute traction / strength (k, c), slips times sqrt(k_t / k_c): slips of equal energy have equal shares."""
+        """Compute t_n / N, t_t / S and sqrt(k_t / k_a) t_a / S (k, c): slips of equal energy have equal shares."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -70,7 +70,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,) of n teeth at openings in one ratio, in the mode with larger end / onset."""
+        """Compute damage levels (n + 1,) of n teeth, openings in one ratio, in the mode with the larger end / onset."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
