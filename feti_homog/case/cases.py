@@ -127,12 +127,12 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase, for "fibre:2" without a section the material "fibre".  Raises KeyError."""
+        """Return the material of a phase; "fibre:2" without a section has the one of "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property
     def fewer_events(self) -> str:
-        """Return advice to reduce the events of a softening law, as the end of a message; else an empty string."""
+        """Return advice on fewer events, to end a message; empty unless a path of events has a softening law."""
         has_events = self.path is not None and self.path.method == "events"
         if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
             return ""
@@ -155,7 +155,7 @@ class Case:
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
-        """List the assumptions about missing settings, one per line."""
+        """List remarks on assumed and on doubtful settings, one per line."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else (*self.cell.table.remarks, *cell_sizes.default_size(self.cell))
@@ -276,7 +276,7 @@ def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str 
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section into a dataclass; None if it is faulty.  An absent section gives defaults or, if needed, None."""
+    """Read a section into a dataclass; None if faulty or absent.  Absent [decomposition] and [output] have defaults."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

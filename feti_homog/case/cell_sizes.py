@@ -1,7 +1,7 @@
 """Derive fibre counts, cell width, element order and element size from the section [cell].
 
-Each fibre phase has a fraction, `mix`, and a radius, `radii`.  If the cell gives an accuracy, element order and size
-follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
+In a mix, each fibre phase has a fraction and may have a radius, `radii`.  If the cell gives an accuracy, element order
+and size follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
 """
 
 from collections.abc import Mapping
@@ -79,7 +79,7 @@ def sized(
     `coarse_error` / 4^(p r) <= eps. Unless `table` gives an order, the order with fewer nodes, about p^2 4^r, is taken.
     Without an accuracy, only the order is set: by `table`, else 2 if linear elements lock, else 1. Faults are added to
     `faults`: r above MOST_REFINED, and a locking order. The coarsest elements have half the fibre distance of a square
-    lattice with this fibre count, to two digits, and at most half the width: circles and gaps need no larger ones.
+    lattice with this fibre count, to two digits, and at most half the width; larger ones would hardly save nodes.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -178,7 +178,7 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def fractions_in_words(cell: Cell) -> str:
-    """Write the fibre and void fractions of a cell without a file as keys."""
+    """Write the fibre and void fractions of a cell without a file as TOML, such as "fibre_fraction = 0.5"."""
     mix = "" if cell.mix is None else f"mix = {wording.toml_value(dict(cell.mix))}"
     fibres = mix or f"fibre_fraction = {cell.fibre_fraction:g}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres

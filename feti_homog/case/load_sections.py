@@ -106,8 +106,8 @@ class AnalysisSection:
     """The section of an analysis; by default no bond breaks.
 
     Attributes:
-        breaks: whether bonds break under the loads of the analysis.
-        is_followed: whether the analysis follows debonding from event to event, and can be resumed.
+        breaks: whether bonds may break under the loads of the analysis.
+        is_followed: whether the analysis follows debonding along a load path, and can be resumed.
     """
 
     breaks: ClassVar[bool] = False

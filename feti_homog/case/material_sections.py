@@ -122,7 +122,7 @@ def _read_material(
 
 
 def _known_stress(material: material_forms.Material, plane: str | None) -> None:
-    """Raise ValueError unless constants give the S33 that a strength needs; accept `plane` None and spatial states."""
+    """Raise ValueError if a strength needs S33, but the constants in a plane state do not give it (None: no check)."""
     is_plane = plane is not None and not voigt.PLANE_STATES[plane].is_spatial
     if is_plane and np.isnan(laws.out_of_plane(material, str(plane))[0]).any():
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")

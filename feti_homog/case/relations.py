@@ -65,7 +65,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return (remark,) if loads or materials may be meant in ply axes, in generalized plane strain alone; else ()."""
+    """Return (remark,) if axes may be mistaken for ply axes, else (); only in generalized plane strain is this so."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed only in generalized plane strain
@@ -92,7 +92,7 @@ def stress_free(
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
     """Read the [interface] sections in file order; None if one is faulty or there are too many, () without any.
 
-    The law goes to `criterion`; a softening branch gives missing constants. Faults are appended to `reader.faults`.
+    `criterion` gets the name of the law; a softening branch gives missing constants. Faults go to `reader.faults`.
     """
     tables = interface_tables(document)
     if document.get("interface") == []:

@@ -52,7 +52,7 @@ class Rule:
     names: tuple[str, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: keys.Selected) -> Iterator[str]:
-        """Yield one line for each value that breaks the rule; numbers of sections and items in a line count from 1."""
+        """Yield one line for each value that breaks the rule; sections are numbered from 1, items of a list from 0."""
         if not all(condition.holds(selected) for condition in self.when):
             return
         content = document.get(self.path[0]) if self.path else document
@@ -243,7 +243,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test or is not a table; true without the key `interface`."""
+    """Return whether any [interface] section passes `test` or is no table; True without the key `interface`."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
