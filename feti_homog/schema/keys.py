@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """A key of `section` that decides which other keys belong to the case; `word` may rename it in messages."""
+    """A key of `section` that decides which other keys belong to the case; messages call it `word`, if not empty."""
 
     section: str
     key: str
@@ -41,7 +41,7 @@ class Condition:
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition, key = A or B, for a message about `section`; [other] precedes another section's key."""
+        """Write "KEY = A or B" or, in a message about another `section` than the selector's, "[OTHER] KEY = A or B"."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
@@ -102,9 +102,9 @@ def key(
 ) -> Any:
     """Return a dataclass field that holds the rules of the key with the field name.
 
-    Without `default` and `absent`, the key is required.  A missing key has the value None if it is required under
-    conditions, or has a meaning `absent`.  `default_words` replace the default in the reference.  `attributes` are
-    further attributes of `Key`.
+    Without `default` and `absent`, the key is required.  `absent` words the meaning of a missing key, whose value is
+    then None; a key that is required under conditions has None, too.  `default_words` replace the default in the
+    reference.  `attributes` are further attributes of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default
