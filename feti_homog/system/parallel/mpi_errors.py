@@ -48,7 +48,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on every rank, and return its result; if a rank raises, every rank raises.  Collective.
 
-    `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
+    `function` must not communicate.  MemoryError becomes NoMemoryError, and OSError with a file name FetiHomogError.
     A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
@@ -148,7 +148,7 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _lines(error: FetiHomogError) -> str:
-    """Return the faults as lines that begin with "error: "."""
+    """Return the faults of an error as lines that begin with "error: "."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 

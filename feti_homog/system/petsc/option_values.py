@@ -210,7 +210,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 def petsc_words(options: Mapping[str, str]) -> list[str]:
     """Return the words with which PETSc starts, from options by name without dash.
 
-    A true flag of PETSc itself has no value, a false one is left out.  False flags of the solver override the case.
+    A true flag of PETSc itself has no value, a false one is left out.  False solver flags stay, to override the case.
     """
     argv = []
     for name, text in options.items():
