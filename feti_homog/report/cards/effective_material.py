@@ -1,4 +1,4 @@
-"""Express the effective material of a result in card axes (axis 1 along the fibre); write conductor cards.
+"""Express the effective material of a result in card axes (axis 1 along the fibre); write cards of conductivities.
 
 Abaqus Keywords Guide and CalculiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS: KXX, KYY, KZZ.
 """
@@ -45,7 +45,7 @@ class EffectiveMaterial:
         name: case name.
         version: program version.
         stress_unit: the case's label, empty if it has none.
-        symmetry: a sentence for the comments of a card.
+        symmetry: statement on the material symmetry, for the comments of a card.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.
@@ -172,7 +172,7 @@ def numbers(value: Any, shape: tuple[int, ...]) -> Float:
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """Return the comment lines at the start of a card, in ASCII, each after `mark`."""
+    """Return the comment lines at the start of a card, in ASCII, each beginning with `mark`."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -200,7 +200,7 @@ def number(value: float) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert a name to at most 60 letters, digits and single underscores, for other characters.
+    """Convert a name to at most 60 letters, digits and single underscores, which replace all other characters.
 
     The prefix `material_` comes before an identifier that does not begin with a letter.
     """

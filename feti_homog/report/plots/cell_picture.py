@@ -72,7 +72,7 @@ def _cyclic_colours(count: int) -> Array:
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the subdomains, coloured one by one or, on several ranks, by rank.
+    """Draw the subdomains, coloured one by one or, if the run had several ranks, by rank.
 
     A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """

@@ -78,7 +78,7 @@ class DeformedCell(drawn_cell.DrawnCell):
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in state `number`, with its nodes at `moved` (p, 2).
 
-        Returns the coloured triangles.  The end of a path has its own colours if its stresses double the earlier ones.
+        Returns the coloured triangles.  The end of a path has its own colours if its stresses are twice as large.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         norm = Normalize(norm.vmin, norm.vmax)  # a shared one would call the artists of earlier frames
@@ -126,7 +126,7 @@ def draw_state(
     The state has index `number` in `out`/result.h5.  Call on one rank.  Returns the caption.
 
     `stress` is a component such as "S11", by default along the largest strain; `scale` multiplies displacements.
-    Colours go from minus `most` to `most`, so that pictures can have one scale; by default they suit the state.
+    Colours go from minus `most` to `most`, so that pictures can share their colours; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.  Raises FetiHomogError if
     result.h5 cannot be read, or has no such state.
@@ -154,7 +154,7 @@ def shown_scale(file: Any, document: Document) -> float:
     """Return the displacement factor for all pictures of an `angle` or `path` analysis.
 
     The case may give the factor; by default the largest displacement and opening are visible and no triangle turns
-    over, but the factor is at least 1 under a load of the case.
+    over, but the factor is at least 1 if the case gives the load.
     """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
@@ -175,7 +175,7 @@ def shown_scale(file: Any, document: Document) -> float:
 
 
 def shown_states(document: Document, most: int, count: int) -> list[int]:
-    """Choose at most `most` of the `count` states for the pictures.
+    """Choose at most `most` of `count` states for pictures, and return their indices.
 
     The states are at the path landmarks, or else evenly spaced, with equal steps if `count` allows.
     """

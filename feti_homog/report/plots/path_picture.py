@@ -139,7 +139,7 @@ def _line_style(values: Array, drawn: list[Array]) -> str:
 
 
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
-    """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
+    """Draw counts of bonded, open and closed nodes: thin lines at all equilibria, thick lines at a rising load."""
     points, drawn = document["path"], list[Array]()
     rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
     # The bonds of an event break at the event, the bonds of an increment on the way to it.
@@ -231,8 +231,8 @@ def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> di
 
     Up to each point the load moves straight, on the first leg along a ray through zero, and energies are quadratic.
     With stress S, strain E, temperature T and their changes d, the slope of the work at an end is S dE + C dT or, under
-    given stresses, dS E of the point; twice the stored energy is S E + C T.  A break at the start of the line loses
-    energy at one load; its work is 0 or, under given stresses alone, twice the loss.
+    given stresses, E dS; the conjugate C of T follows from the stored energy (S E + C T) / 2.  A break at the start of
+    the way loses energy at one load; its work is 0 or, under given stresses alone, twice the loss.
     """
     path, legs, axis = document["case"]["path"], path_curves.legs(document), path_curves.abscissa(document)[0]
     table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}

@@ -225,5 +225,5 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """Shorten vectors (..., 2) by whole periods."""
+    """Shift vectors (..., 2) by whole periods, to components of at most half a period."""
     return np.asarray(vectors - period * np.round(vectors / period))

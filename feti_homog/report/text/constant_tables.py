@@ -272,7 +272,7 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Select names of constants for tables: with E1 or k11 the SHOWN_* ones, else MOST names, off-diagonals last."""
+    """Select names for tables: of SHOWN_* if E1 or k11 is among them, else MOST at most, off-diagonal entries last."""
     if {"E1", "k11"} & {*names}:
         return [name for name in (SHOWN_IN_SPACE if "E3" in names else SHOWN_IN_PLANE) if name in names]
     return sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]

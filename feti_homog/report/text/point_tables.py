@@ -41,7 +41,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Return a table of stresses or stiffnesses at up to `limit` angles (None: all), with node counts in the plane."""
+    """Return a table of stresses or stiffnesses at up to `limit` angles (None: all); plane states have node counts."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []

@@ -43,7 +43,7 @@ def in_brackets(unit: str) -> str:
 
 
 def with_micro(unit: str) -> str:
-    """Write "um" in a unit with the micro sign."""
+    """Replace the letter u of "um" in a unit by the micro sign."""
     return re.sub(r"\bum(?![A-Za-z])", "\N{MICRO SIGN}m", unit)
 
 
