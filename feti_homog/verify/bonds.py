@@ -63,7 +63,7 @@ class BondLaw(ABC):
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
+        """Compute energies per area (k,) absorbed in modes psi as damage rises; for elastic bonds, `lost` in breaks."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -85,7 +85,7 @@ class BondLaw(ABC):
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return stiffnesses or strengths (`kind`), (c,) or (k, c): by default inf, axially the tangential value."""
+        """Return stiffnesses or strengths (`kind`), (c,) or (k, c); inf if missing, axial ones as tangential ones."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -175,7 +175,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    With shear traction t, intact and damaged compliances C_0 and C, and slip C_0 t + g, it is t - g / (C - C_0).
+    It is t - g / (C - C_0) with shear traction t, slip C_0 t + g, and compliances C_0 (intact) and C (damaged).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

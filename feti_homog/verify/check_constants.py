@@ -36,8 +36,8 @@ def check_status(findings: Findings, cell: DiscreteCell) -> None:
 def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that stiffnesses are symmetric, and that the thermal stress S obeys Levin's formula.
 
-    S : E = -<alpha : L : eps> with the strains eps under E, expansions alpha and stiffnesses L of the phases.  Debonded
-    cells with contact have no reciprocity and are skipped.
+    S : E = -<alpha : L : eps> with strains eps under a strain E, expansions alpha and stiffnesses L of the phases.
+    Debonded cells with contact have no reciprocity and are skipped.
     """
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
@@ -98,7 +98,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the closed forms of the conductivity and, without conductances, that it is within Wiener's bounds."""
+    """Check closed-form bounds and estimates; without conductances, Wiener's bounds must enclose the conductivity."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (x1, _, x3) = cell.fractions, GRADIENT
     axial, across = cell.stiffnesses[:, x3, x3], cell.stiffnesses[:, x1, x1]

@@ -130,7 +130,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the onsets in `envelope` by superposing the unit loads; debonded and released nodes have no utilisation."""
+    """Check onsets in `envelope` by superposing unit loads, except at tips that break by energy release."""
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release

@@ -70,9 +70,9 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Bound the relative rounding of stresses and of work: machine precision times a condition and the contrast.
+    """Bound the relative rounding of stresses, 6 eps times a condition, and of work, 6 eps times the contrast.
 
-    The condition of stresses is S_iijj / (3 min eig S), the largest of all phase compliances S.
+    With the machine precision eps; the condition is the largest S_iijj / (3 min eig S) of all phase compliances S.
     """
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures

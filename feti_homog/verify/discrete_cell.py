@@ -154,7 +154,7 @@ class DiscreteCell:
 
     @cached_property
     def directions(self) -> Float:
-        """Compute directions (k,) in degrees from the fibre centres to the interface nodes."""
+        """Compute directions (k,) in degrees from the fibre centres to the interface nodes; NaN without a centre."""
         rows = self.files.interface
         x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.shift).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
