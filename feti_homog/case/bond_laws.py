@@ -20,7 +20,7 @@ class BondLawEntry:
         implementation: module and class of both implementations, as "module.Class".
         keys: keys of [interface] that this law has, but not all other laws.
         needs: keys that this law requires.
-        limits: keys; bonds can break if one is finite. Empty if the law always has a limit.
+        limits: strength keys; bonds can break if one is finite. Empty if the law always has a limit.
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows with damage before a bond breaks.

@@ -104,7 +104,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """Return the first interface, None for perfect bonding; all share contact, criterion and growth."""
+        """Return the first interface, None for perfect bonding; all interfaces share contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property

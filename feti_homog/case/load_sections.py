@@ -72,7 +72,7 @@ def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str
     """Complete the loads of a path: return, for each load, name -> value for every component.
 
     In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
-    the previous load; before the first load, all stresses are zero.
+    the previous load; before the first load, all stresses and the temperature are zero.
     """
     state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, TEMPERATURE) if state.is_spatial else state.stresses, 0.0)
