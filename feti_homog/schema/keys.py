@@ -41,7 +41,7 @@ class Condition:
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write "KEY = A or B" or, in a message about another `section` than the selector's, "[OTHER] KEY = A or B"."""
+        """Write "KEY = A or B"; "[SECTION] KEY = A or B" for a message about another `section` than the selector's."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
@@ -80,7 +80,7 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault of the key `name` in a table; empty without a fault.
+        """Return the fault of the key `name` in a table; an empty string without a fault.
 
         The text follows the name in a message. `only` is not checked; keys with conditions may be missing.
         """
