@@ -88,7 +88,7 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """Call main() on every rank, and return its exit code.  Collective.
 
-    If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints it, and its exit code is returned.
+    If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints its own; the exit code is returned.
     After any other exception, or a FetiHomogError only on some ranks, the rank prints it and aborts the job.
     """
     try:
@@ -104,7 +104,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print the exception of this rank, and abort the processes of all ranks with its exit code; never returns."""
+    """Print an exception of this rank, and abort the processes of all ranks with the exception's exit code."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
