@@ -122,7 +122,7 @@ def thermal(document: Document) -> list[Table]:
 
 
 def moduli(document: Document) -> Table:
-    """Return a table of the moduli in the plane, as text two per line: moduli at the left, ratios at the right."""
+    """Return a table of the moduli in the plane, in text two per line: moduli at the left, ratios at the right."""
     values, errors = document["moduli"], _errors(document).get("constants", {})
     sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
     names = [name for pair in zip_longest(*sides) for name in pair if name is not None]

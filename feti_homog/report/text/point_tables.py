@@ -98,7 +98,7 @@ def debonded(document: Document, point: Point) -> list[str]:
 
 
 def envelope_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of onset loads and first breaks in at most `limit`, or `ENVELOPE_ROWS`, directions."""
+    """Return the table of onset loads and first breaks in at most `limit` directions, by default `ENVELOPE_ROWS`."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
     unit = stress_label(document) if axes[0].startswith("S") else ""

@@ -53,7 +53,7 @@ def stress_label(document: Document) -> str:
 
 
 def toughness_label(document: Document) -> str:
-    """Return the unit of energy release rates, in brackets.  It is empty unless the case labels both units."""
+    """Return the unit of energy release rates, in brackets; empty unless the case labels stresses and lengths."""
     output = document["case"].get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     return in_brackets(f"{stress} {length}") if stress and length else ""
