@@ -76,7 +76,7 @@ class BondLaw(ABC):
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """Compute energies per area (k, 2): G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a)."""
+        """Compute bond energies per area (k, 2): G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a)."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
@@ -96,7 +96,7 @@ class MaxStrength(BondLaw):
     """The law of the largest ratio: max_i <t_i> / R_i = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute max_i <t_i> / R_i (k,)."""
+        """Compute the utilisation max_i <t_i> / R_i (k,)."""
         return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
 
     def breaks(self, traction: Float) -> dict[str, float]:
@@ -108,21 +108,18 @@ class QuadraticStrength(MaxStrength):
     """The quadratic law: sum_i (<t_i> / R_i)^2 = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute sqrt(sum_i (<t_i> / R_i)^2) (k,)."""
+        """Compute the utilisation sqrt(sum_i (<t_i> / R_i)^2) (k,)."""
         return np.asarray(np.sqrt(np.square(self.shares(traction)).sum(axis=1)))
 
 
 class SpringEnergy(BondLaw):
-    """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
-
-    With toughness G_Ic, mode sensitivity lambda, G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
-    """
+    """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks a bond, mode sensitivity lambda."""
 
     has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute sqrt((G_I + G_II) / G_c) (k,)."""
+        """Compute the utilisation sqrt((G_I + G_II) / G_c) (k,), see `energies` and `lost`."""
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
 
     def lost(self, psi: Float) -> Float:

@@ -161,7 +161,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
-    """Compute k = C_iijj / 4 and mu = (C_ijij - C_iijj / 2) / 4 of the isotropic stiffness nearest to `c` (3, 3)."""
+    """Compute bulk modulus C_iijj / 4 and shear modulus (C_ijij - C_iijj / 2) / 4 nearest to a stiffness `c` (3, 3)."""
     spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
 

@@ -99,7 +99,7 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
 
 
 def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
-    """Check that `tips` of a point are the bonds beside broken bonds.  Tractions must give their modes and energies.
+    """Check that `tips` lists the bonds beside broken bonds, with modes and energies that follow from the tractions.
 
     Returns the state with the utilisation sqrt(G / toughness) of tips that break by energy release; G is in the file.
     """

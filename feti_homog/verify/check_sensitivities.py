@@ -171,7 +171,10 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """Compute <sigma_j : eps_i> plus springs, (v, v) or (6, 7), of strain states i and all states j for a `case`."""
+    """Compute the matrix <sigma_j : eps_i> plus spring work between states, (v, v) or (6, 7), for a `case`.
+
+    Rows i are the states under strains, in the order of components; columns j end with the state under temperature.
+    """
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)

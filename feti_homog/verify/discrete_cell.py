@@ -183,7 +183,7 @@ class DiscreteCell:
         return self.integrals(self.sides.on_side)
 
     def integrals(self, which: Bool) -> Float:
-        """Compute int N_a n ds (nodes, 2) over the sides `which`.  N_a are shape functions, n normals inwards.
+        """Compute integrals int N_a n ds (nodes, 2) over the sides `which`: shape functions N_a, normals n inwards.
 
         On a side this is sum_b int N_a dN_b/ds x_b with nodes x_b, rotated to the normal.
         """

@@ -72,7 +72,7 @@ class Elements:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """Compute int dN_a/dx (n, 2) over the elements at every node a."""
+        """Compute gradient integrals int dN_a/dx (n, 2), over the elements at every node a, of shape functions N_a."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))

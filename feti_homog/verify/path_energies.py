@@ -35,7 +35,7 @@ from feti_homog.verify.reading import Status
 class PointNumbers:
     """The strains and stresses (n,), stored energy per area and load at a path point.
 
-    Strains and stresses end with the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
+    With n = 7, the last ones are the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
     """
 
     name: str
