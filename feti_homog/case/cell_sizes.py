@@ -17,7 +17,7 @@ from feti_homog.microstructure import phase_names
 from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
-"""Largest Poisson's ratio of linear triangles; above it they lock."""
+"""Poisson's ratio above which linear triangles lock."""
 # Poisson's ratio above which rounding may fail the checks. At 0.4999999, with fibres a thousandth as stiff
 # as the matrix, iterative refinement lowers the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999

@@ -29,7 +29,7 @@ DATA_SHEET = {
     **dict.fromkeys(("alpha1", "alpha11", "alphal", "cte1", "cte11", "ctel"), "expansion_axial"),
     **dict.fromkeys(("alpha2", "alpha22", "alphat", "cte2", "cte22", "ctet"), "expansion_transverse"),
 }
-"""Names of constants on data sheets, whose axis 1 is along the fibres, and keys of this program for them."""
+"""Keys of this program by the names of constants on data sheets, whose axis 1 is along the fibres."""
 
 
 def read_materials(
@@ -122,7 +122,7 @@ def _read_material(
 
 
 def _known_stress(material: material_forms.Material, plane: str | None) -> None:
-    """Raise ValueError if a strength needs S33, but the constants in a plane state do not give it (None: no check)."""
+    """Raise ValueError if constants leave S33, which a strength needs, open in the plane state (None: no check)."""
     is_plane = plane is not None and not voigt.PLANE_STATES[plane].is_spatial
     if is_plane and np.isnan(laws.out_of_plane(material, str(plane))[0]).any():
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")

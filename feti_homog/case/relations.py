@@ -135,7 +135,7 @@ def _written(value: Any) -> str:
 
 
 def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
-    """Give bonds without constants, which hold, 1e4 times the normal constants of the first bond with all constants."""
+    """Return the sections; bonds without constants, which hold, get 1e4 times the normal ones of breaking bonds."""
     names = (*STIFFNESSES, *COHESIVE)
     breaking = next((bond for bond in interfaces if all(getattr(bond, name) for name in names)), None)
     if breaking is None:

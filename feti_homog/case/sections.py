@@ -277,7 +277,7 @@ KEY_OWNERS = {
     for table in TABLES
     for name in keys.keys_of(table.contents)
 }
-"""The tables of each key, in words."""
+"""The tables that have a key, in words, by key name."""
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
