@@ -21,7 +21,7 @@ FIBRE_FIRST = (2, 0, 1)
 PAIRS: list[tuple[int, ...]] = [(int(name[1]) - 1, int(name[2]) - 1) for name in voigt.SPATIAL_STRESSES]
 """The pairs of axes of Voigt's order [11, 22, 33, 23, 13, 12]."""
 ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
-"""The indices of a card's components in the order of the cell: C_card = C_cell[ORDER][:, ORDER]."""
+"""The cell's Voigt components in the order of a card: C_card = C_cell[ORDER][:, ORDER]."""
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) entries at which the stiffness of an orthotropic material is 0 in material axes."""
 COUPLINGS[:3, :3] = False

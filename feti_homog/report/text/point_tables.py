@@ -175,4 +175,4 @@ TABLES: dict[str, Callable[[Document, int | None], list[Table]]] = {
     "load": lambda document, limit: [load_table(document)],
     "envelope": lambda document, limit: [envelope_table(document, limit)],
 }
-"""Tables of an analysis, with at most `limit` rows of points; None for the rows of the summary."""
+"""Functions that return tables by analysis, with at most `limit` rows of points (None: as in the summary)."""

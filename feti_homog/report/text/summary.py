@@ -258,7 +258,7 @@ def phase_tables(document: Document) -> list[Table]:
 
 
 def _stress_error(document: Document) -> list[str]:
-    """Return [note on the relative error of stresses], the root of the largest energy error; [] without estimates."""
+    """Return a note on the relative error of stresses, estimated from the energies, in a list; [] without errors."""
     points = [document.get("load", {}), *document.get("path", ()), *document.get("angle", ())]
     energies = [point.get("mesh_error") for point in points] + [(document.get("mesh_error") or {}).get("energy")]
     error = without_noise(max(energy or 0.0 for energy in energies) ** 0.5)
