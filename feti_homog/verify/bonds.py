@@ -47,7 +47,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the numbers that describe a break under the traction (1, c), by the keys of envelope points."""
+        """Return the numbers of a break under the traction (1, c), with their keys in envelope points."""
 
     def jumps(self, traction: Float) -> Float:
         """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
@@ -81,7 +81,7 @@ class BondLaw(ABC):
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
     def shares(self, traction: Float) -> Float:
-        """Compute the ratios (k, c) of traction components to their strengths."""
+        """Compute the ratios <t_i> / R_i (k, c) of traction components to strengths."""
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
@@ -100,7 +100,7 @@ class MaxStrength(BondLaw):
         return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the ratios <t_i> / R_i by component."""
+        """Return the ratios <t_i> / R_i under the keys "normal", "tangential" and, for c = 3, "axial"."""
         return dict(zip(("normal", "tangential", "axial"), self.shares(traction)[0].tolist(), strict=False))
 
 
@@ -128,7 +128,7 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(angle) ** 2))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the mode psi in degrees."""
+        """Return the mode psi in degrees under the key "psi"."""
         return {"psi": float(np.degrees(self.mode(traction))[0])}
 
 

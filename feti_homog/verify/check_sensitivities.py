@@ -24,7 +24,7 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants, and derivatives along one change of all parameters."""
+    """Check the values of all constants, and their derivatives in one direction, in which all parameters change."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):

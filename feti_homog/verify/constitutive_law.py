@@ -72,7 +72,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
     """Bound the relative rounding of stresses, 6 eps times a condition, and of work, 6 eps times the contrast.
 
-    With the machine precision eps; the condition is the largest S_iijj / (3 min eig S) of all phase compliances S.
+    eps is the machine precision, the condition the largest S_iijj / (3 min eig S) of all phase compliances S.
     """
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures

@@ -103,7 +103,7 @@ class Findings:
         self.record(law, 0.0 if holds else np.inf, where)
 
     def worst(self) -> tuple[Finding, ...]:
-        """Return the largest violations of all laws that apply, in the order of `checks`."""
+        """Return the finding with the largest violation of each law that applies, in the order of `checks`."""
         return tuple(self._worst[name] for name in self._checks if name in self._worst)
 
 

@@ -181,7 +181,7 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
     """Check the work, and the loss in breaks by (P).
 
     The loss is the potential with old bonds minus the potential with new bonds, at the load of the break: after an
-    event point, or at the end of an increment.  There, the energy by Voigt's stiffness is another upper bound.
+    event point, or at the end of an increment.  In increments, Voigt's stiffness bounds the energy of old bonds, too.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)
