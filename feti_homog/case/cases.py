@@ -127,7 +127,7 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase; "fibre:2" without a section has the one of "fibre".  Raises KeyError."""
+        """Return the material of a phase; without a section, "fibre:2" shares the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property
@@ -184,7 +184,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.  Raises OSError if a file of [cell] is unreadable.
 
-        Left out: name, PETSc options, max_events and, without `with_output`, all of [output].  Files count by content.
+        Name, PETSc options, max_events and, without `with_output`, [output] do not count.  Files count by content.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:

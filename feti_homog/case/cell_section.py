@@ -268,7 +268,7 @@ class Cell:
 
     @property
     def has_voids(self) -> bool:
-        """Return whether the cell has voids or hollow fibres, apart from voids in images."""
+        """Return whether the cell has voids or hollow fibres; voids in images do not count."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 

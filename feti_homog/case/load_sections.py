@@ -124,7 +124,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for as many unit loads as `loads`; one-sided contact needs both signs of each."""
+        """Return the number of solves under `loads` unit loads; one-sided contact needs both signs of each load."""
         return 2 * loads if one_sided else loads
 
 

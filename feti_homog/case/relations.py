@@ -65,7 +65,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return (remark,) if axes may be mistaken for ply axes, else (); only in generalized plane strain is this so."""
+    """Return (remark,) if axes may be mistaken for ply axes, else (); always () except in generalized plane strain."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed only in generalized plane strain
