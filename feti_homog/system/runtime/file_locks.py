@@ -138,7 +138,7 @@ def _written(file: int) -> str:
 
 
 def tag() -> str:
-    """Return a name for files of this process, unlike that of any process on any machine at any time."""
+    """Return a name for the files of this process, unique over all machines and all time."""
     return f"{socket.gethostname()}.{os.getpid()}.{_began(os.getpid())}"
 
 
