@@ -79,7 +79,7 @@ def abaqus(
 
 
 def calculix(material: effective_material.EffectiveMaterial) -> str:
-    """Return the CalculiX card: as for Abaqus, but with TYPE=ANISO in *ELASTIC and the tensor's shears of expansion."""
+    """Return the CalculiX card: as for Abaqus, but with ANISO for ANISOTROPIC, and the tensor's shears of expansion."""
     return abaqus(material, "ANISO", TENSOR_SHEARS)
 
 

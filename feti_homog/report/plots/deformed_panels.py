@@ -71,14 +71,14 @@ class DeformedCell(drawn_cell.DrawnCell):
         return self.file[f"state/{number}"]
 
     def moved(self, number: int) -> Array:
-        """Return the positions (p, 2) of the drawn nodes in a deformed state."""
+        """Return the positions (p, 2) of the drawn nodes in state `number`, displaced by `scale` times u."""
         places: Array = self.drawn.points + self.scale * decimation.drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in state `number`, with its nodes at `moved` (p, 2).
 
-        Returns the coloured triangles.  The end of a path has its own colours if its stresses are twice as large.
+        Returns the coloured triangles.  The end of a path has its own colours above twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         norm = Normalize(norm.vmin, norm.vmax)  # a shared one would call the artists of earlier frames
