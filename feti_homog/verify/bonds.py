@@ -113,7 +113,7 @@ class QuadraticStrength(MaxStrength):
 
 
 class SpringEnergy(BondLaw):
-    """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks a bond, mode sensitivity lambda."""
+    """The energy law: a bond breaks at G_I + G_II = G_Ic [1 + tan^2((1 - lambda) psi)], lambda = mode_sensitivity."""
 
     has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True

@@ -219,7 +219,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that energy errors reach LEAST_SHARE of the sum of element errors; for unit loads, estimate this sum."""
+    """Check that energy errors are at least LEAST_SHARE of summed element errors; under unit loads, check this sum."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

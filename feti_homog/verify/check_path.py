@@ -130,7 +130,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check onsets in `envelope` by superposing unit loads, except at tips that break by energy release."""
+    """Check `envelope` by superposing the unit loads; tips that break by energy release have no utilisation."""
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release

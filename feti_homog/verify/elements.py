@@ -72,7 +72,7 @@ class Elements:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """Compute gradient integrals int dN_a/dx (n, 2), over the elements at every node a, of shape functions N_a."""
+        """Compute integrals int dN_a/dx (n, 2) of shape function gradients over the elements at each node a."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
@@ -106,7 +106,7 @@ class Elements:
     def responses(
         self, displacement: Float, along: float, free: Float
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
-        """Yield slices, gradients and weights like `_parts`, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
+        """Yield slices, gradients and weights as in `_parts`, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
         v = self._stiffnesses.shape[1]
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]

@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Context manager: open the results in a folder.  Raises like `altered`; OSError, KeyError if result.h5 is bad."""
+    """Context manager: open a result folder.  Raises like `altered`; OSError or KeyError for a faulty result.h5."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {

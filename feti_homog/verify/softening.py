@@ -60,7 +60,7 @@ class Cohesive(QuadraticStrength):
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """Compute t_n / N, t_t / S and sqrt(k_t / k_a) t_a / S (k, c), strengths N, S: equal energy, equal share."""
+        """Compute t_n / N, t_t / S and sqrt(k_t / k_a) t_a / S (k, c) for the strengths N and S of first damage."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -93,7 +93,7 @@ class Cohesive(QuadraticStrength):
     @property
     @abstractmethod
     def last(self) -> float:
-        """Return u at the end of the branch, or at the beginning of its last tooth."""
+        """Return u at the end of the branch or, if it has no end, at the beginning of its last tooth."""
 
     @abstractmethod
     def branch(self, u: Float) -> Float:
@@ -107,7 +107,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """Compute K, delta_0 and stretch = (G_c - K delta_0^2 / 2) / (K delta_0 under(inf)) (k,), toughness G_c."""
+        """Compute K, delta_0 and the stretch for which t(delta) absorbs the toughness, all (k,), in modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt
