@@ -59,7 +59,7 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Load a case from a file; its default name is the file name.  Raises CaseError with all faults."""
+        """Load a case from a file, whose stem is the default case name.  Raises CaseError with all faults."""
         return cls.parse(read_document(path), Path(path).parent)
 
     @classmethod
@@ -127,7 +127,7 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase; without a section, "fibre:2" shares the material "fibre".  Raises KeyError."""
+        """Return the material of a phase; without a section, "fibre:2" has the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property

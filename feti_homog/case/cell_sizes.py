@@ -108,7 +108,7 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Suggest `accuracy` for a fibre table; [] unless default elements are longer than the mean radius."""
+    """Suggest `accuracy` if elements of the default mesh_size are longer than a table's mean fibre radius; else []."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
