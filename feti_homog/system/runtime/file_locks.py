@@ -120,7 +120,7 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Return the name (see `this_process`) of the process with the exclusive lock; None without lock or access."""
+    """Return the `this_process` name of the holder of an exclusive lock on `path`; None without a lock or access."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None
