@@ -17,10 +17,10 @@ class BondLawEntry:
 
     Attributes:
         name: value of [interface] law or criterion.
-        implementation: "module.Class".
+        implementation: module and class of both implementations, as "module.Class".
         keys: keys of [interface] that this law has, but not all other laws.
         needs: keys that this law requires.
-        limits: keys; bonds can break if one is finite. Empty if the law always has a limit.
+        limits: strength keys; bonds can break if one is finite. Empty if the law always has a limit.
         description: for the reference: the utilisation that is 1 when a bond breaks, or the kind of softening.
         symbols: labels in pictures: symbol, key, and whether the unit is a stress.
         softens: whether the spring compliance grows with damage before a bond breaks.
@@ -36,7 +36,7 @@ class BondLawEntry:
     softens: bool = False
 
     def missing(self, name: str, table: Mapping[str, Any], _: object) -> str:
-        """Return the fault of the required key `name` that a table lacks, in most cases with a possible value."""
+        """Return the end of the fault line for a table without the required key `name`, in most cases with advice."""
         fault = f": missing; law = {wording.toml_value(self.name)} needs it"
         if (normal := name.replace("tangential", "normal")) != name:
             value = f" = {wording.toml_value(table[normal])}" if normal in table else ""

@@ -59,7 +59,7 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """Load a case from a file; its default name is the file name.  Raises CaseError with all faults."""
+        """Load a case from a file, whose stem is the default case name.  Raises CaseError with all faults."""
         return cls.parse(read_document(path), Path(path).parent)
 
     @classmethod
@@ -104,7 +104,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """Return the first interface, None for perfect bonding; all share contact, criterion and growth."""
+        """Return the first interface, None for perfect bonding; all interfaces share contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
@@ -127,12 +127,12 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> material_forms.Material:
-        """Return the material of a phase; "fibre:2" without a section has the material "fibre".  Raises KeyError."""
+        """Return the material of a phase; without a section, "fibre:2" has the material "fibre".  Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     @property
     def fewer_events(self) -> str:
-        """Return the end of a message: advice for fewer events on a damage path; empty for other cases."""
+        """Return advice on fewer events, to end a message; empty unless a path of events has a softening law."""
         has_events = self.path is not None and self.path.method == "events"
         if self.interface is None or not has_events or not bond_laws.LAWS[self.interface.criterion].softens:
             return ""
@@ -155,7 +155,7 @@ class Case:
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
-        """List the assumptions about missing settings, one per line."""
+        """List remarks on assumed and on doubtful settings, one per line."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else (*self.cell.table.remarks, *cell_sizes.default_size(self.cell))
@@ -184,7 +184,7 @@ class Case:
     def digest(self, with_output: bool = True) -> str:
         """Return a digest of all settings that change results.  Raises OSError if a file of [cell] is unreadable.
 
-        Name, PETSc options and max_events are left out, also [output] without `with_output`; files count by content.
+        Name, PETSc options, max_events and, without `with_output`, [output] do not count.  Files count by content.
         """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
@@ -270,13 +270,13 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
 
 @lru_cache
 def _applicable(names: frozenset[str], selected: tuple[tuple[keys.Selector, str | None], ...]) -> list[Rule]:
-    """Select the rules for the document and the sections `names` with conditions that `selected` meets."""
+    """Return the rules on the document or the sections `names` whose conditions all hold for the `selected` values."""
     rules = (rule for rule in RULES if not rule.path or rule.path[0] in names)
     return [rule for rule in rules if all(condition.holds(dict(selected)) for condition in rule.when)]
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """Read a section into a dataclass, with defaults if it may be absent; None if faulty or missing."""
+    """Read a section into a dataclass; None if faulty or absent.  Absent [decomposition] and [output] have defaults."""
     if section not in document and section in (*sections.REQUIRED, *sections.SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(sections.SECTIONS[section], document.get(section, {}), section)

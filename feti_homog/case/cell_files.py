@@ -44,7 +44,7 @@ def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def missing(file: Path) -> str:
-    """Return the reason why a file is missing, or an empty string if the file exists."""
+    """Return the reason why a path is no regular file, or an empty string if it is one."""
     if os.path.isfile(file):  # False, not an error, if the name is too long
         return ""
     if not os.path.exists(file):
@@ -53,9 +53,9 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return a random cell with the window that it matches; append faults to `faults`.
+    """Read the fibre table `match` of a random cell into `matched`; append faults to `faults`.
 
-    The window provides a missing fibre count or fraction. Without a readable window, the cell does not change.
+    The table provides a missing fibre count or fraction. Without a readable table the cell is returned unchanged.
     """
     if cell.match is None:
         return cell
@@ -126,7 +126,7 @@ HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDE
 
 
 def check_shapes(table: fibre_table.FibreTable, faults: list[str]) -> None:
-    """Append the faults of shapes to `faults` or, if there are none, the faults of hollow fibres."""
+    """Check the fibre shapes in a table and, if these are valid, its hollow fibres; append faults to `faults`."""
     from feti_homog.microstructure.shapes import shapes  # few cases need it
 
     rows, before = table.columns, len(faults)

@@ -268,11 +268,11 @@ class Cell:
 
     @property
     def has_voids(self) -> bool:
-        """Return whether the cell has voids or hollow fibres, apart from voids in images."""
+        """Return whether the cell has voids or hollow fibres; voids in images do not count."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 
     @property
     def has_own_mesh(self) -> bool:
-        """Return whether the user provides the mesh, or an image of it."""
+        """Return whether the user provides a mesh, or an image that becomes the mesh."""
         return self.geometry in ("mesh", "pixels")

@@ -1,7 +1,7 @@
-"""Derive fibre counts, cell width, element order and element size from a cell section.
+"""Derive fibre counts, cell width, element order and element size from the section [cell].
 
-Each fibre phase has a fraction, `mix`, and a radius, `radii`.  If the cell gives an accuracy, element order and size
-follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
+In a mix, each fibre phase has a fraction and may have a radius, `radii`.  If the cell gives an accuracy, element order
+and size follow from an error estimate.  Mixed elements have a bubble and a pressure inside each element.
 """
 
 from collections.abc import Mapping
@@ -17,14 +17,14 @@ from feti_homog.microstructure import phase_names
 from feti_homog.schema import types, wording
 
 LOCKING_POISSON = 0.49
-"""Largest Poisson's ratio of linear triangles; above it they lock."""
+"""Poisson's ratio above which linear triangles lock."""
 # Poisson's ratio above which rounding may fail the checks. At 0.4999999, with fibres a thousandth as stiff
 # as the matrix, iterative refinement lowers the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
-    """Return whether elements of an order are mixed elements for a material in a plane state."""
+    """Return whether elements of `order` are mixed: quadratic, of isotropic material, in a plane state that locks."""
     return order == 2 and voigt.PLANE_STATES[plane].locks and laws.isotropic_ratio(material) is not None
 
 
@@ -76,10 +76,10 @@ def sized(
     """Return the cell with mesh size, refinement and element order that follow from its accuracy.
 
     For an accuracy eps and elements of order p, the coarsest mesh is refined r times, with the least r such that
-    `coarse_error` / 4^(p r) <= eps. The order with fewer nodes, about p^2 4^r, is chosen. Without an accuracy, only the
-    order is set, to 2 if linear elements lock. Faults are added to `faults`: r above MOST_REFINED, and a locking order.
-    The coarsest elements have half the fibre distance of a square lattice with this fibre count, to two digits, and at
-    most half the width: with smaller elements at circles and gaps, coarser meshes hardly have fewer elements.
+    `coarse_error` / 4^(p r) <= eps. Unless `table` gives an order, the order with fewer nodes, about p^2 4^r, is taken.
+    Without an accuracy, only the order is set: by `table`, else 2 if linear elements lock, else 1. Faults are added to
+    `faults`: r above MOST_REFINED, and a locking order. The coarsest elements have half the fibre distance of a square
+    lattice with this fibre count, to two digits, and at most half the width; larger ones would hardly save nodes.
 
     Args:
         table: the [cell] table of the file, with or without an order.
@@ -108,7 +108,7 @@ def sized(
 
 
 def default_size(cell: Cell) -> list[str]:
-    """Suggest `accuracy` for a fibre table; [] unless default elements are longer than the mean radius."""
+    """Suggest `accuracy` if elements of the default mesh_size are longer than a table's mean fibre radius; else []."""
     if cell.table is None or cell.table.width is None or cell.accuracy is not None or cell.mesh_size != Cell.mesh_size:
         return []
     ratio = cell.mesh_size / 2**cell.refine * cell.table.width / float(cell.table.radius.mean())
@@ -117,7 +117,7 @@ def default_size(cell: Cell) -> list[str]:
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return fibre count and height / width of a cell without a user mesh; all rows of a table count."""
+    """Return fibre count and height / width of a cell without a user mesh; tables need a size, and all rows count."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width
@@ -126,7 +126,7 @@ def fibres_and_height(cell: Cell) -> tuple[int, float]:
 
 
 def coarse_error(materials: Mapping[str, material_forms.Material], plane: str, order: int, free_faces: bool) -> float:
-    """Estimate the relative strain energy error on the coarsest mesh from above.
+    """Estimate an upper bound of the relative strain energy error on the coarsest mesh.
 
     The estimate is C_p kappa max s beta^2 with beta = |lambda - 1| / (lambda + 1) and C_p = COARSE_ERROR of `order` p.
     lambda are the eigenvalues of a phase stiffness relative to the stiffness around the phase, 0 at free faces; s is
@@ -159,7 +159,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
     A phase with fraction c_p and radius r_p has the expected number e_p ~ c_p / r_p^2. Each phase gets one fibre, and
     each further fibre goes to the phase with the largest e_p / (2 n_p + 1), where n_p is its number so far: the method
-    of Sainte-Lague, which rounds all e_p to whole numbers with the given sum.
+    of Sainte-Lague, which rounds all e_p to whole numbers with the rounded sum of all e_p.
     """
     expected = _expected_counts(cell)
     count = max(len(expected), round(fsum(expected.values())))
@@ -178,14 +178,14 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def fractions_in_words(cell: Cell) -> str:
-    """Write the fibre and void fractions of a cell without a file as keys."""
+    """Write the fibre and void fractions of a cell without a file as TOML, such as "fibre_fraction = 0.5"."""
     mix = "" if cell.mix is None else f"mix = {wording.toml_value(dict(cell.mix))}"
     fibres = mix or f"fibre_fraction = {cell.fibre_fraction:g}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Return the cell width, or None if it follows from `fibre_radius` or is the default.
+    """Return the width W of the cell, or None if it follows from `fibre_radius` or is the default.
 
     With radii and a fibre count, W^2 = sum n_p pi r_p^2 / sum c_p, with symbols as in `fibre_counts`.
     """

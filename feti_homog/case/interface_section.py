@@ -239,5 +239,5 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
 
 
 def labelled(sections: Sequence[T]) -> list[tuple[str, T]]:
-    """Return pairs (label in messages, interface section); the labels of several sections are numbered from 1."""
+    """Return pairs (label, section) for messages: the label is "interface", or "interface 1" and so on for several."""
     return [(f"interface {number}" if len(sections) > 1 else "interface", s) for number, s in enumerate(sections, 1)]

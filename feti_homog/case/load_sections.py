@@ -69,10 +69,10 @@ WAYPOINTS = types.list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Complete the loads of a path: name -> value for every component.
+    """Complete the loads of a path: return, for each load, name -> value for every component.
 
     In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
-    the previous load; before the first load, all stresses are zero.
+    the previous load; before the first load, all stresses and the temperature are zero.
     """
     state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, TEMPERATURE) if state.is_spatial else state.stresses, 0.0)
@@ -106,8 +106,8 @@ class AnalysisSection:
     """The section of an analysis; by default no bond breaks.
 
     Attributes:
-        breaks: whether bonds break under the loads of the analysis.
-        is_followed: whether the analysis follows debonding from event to event, and can be resumed.
+        breaks: whether bonds may break under the loads of the analysis.
+        is_followed: whether the analysis follows debonding along a load path, and can be resumed.
     """
 
     breaks: ClassVar[bool] = False
@@ -115,7 +115,7 @@ class AnalysisSection:
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Return the successive openings of all arcs; empty if each arc has its own angle."""
+        """Return the successive openings, in degrees, that all arcs share; () if each arc has its own angle."""
         return ()
 
     @property
@@ -124,7 +124,7 @@ class AnalysisSection:
         return {}
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves for a number of unit `loads`; one-sided contact needs both signs."""
+        """Return the number of solves under `loads` unit loads; one-sided contact needs both signs of each load."""
         return 2 * loads if one_sided else loads
 
 
@@ -154,7 +154,7 @@ class Angle(AnalysisSection):
 
     @property
     def openings(self) -> tuple[float, ...]:
-        """Return the successive openings of all arcs."""
+        """Return the successive openings of all arcs, in degrees."""
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:

@@ -29,7 +29,7 @@ DATA_SHEET = {
     **dict.fromkeys(("alpha1", "alpha11", "alphal", "cte1", "cte11", "ctel"), "expansion_axial"),
     **dict.fromkeys(("alpha2", "alpha22", "alphat", "cte2", "cte22", "ctet"), "expansion_transverse"),
 }
-"""Names of constants on data sheets, whose axis 1 is along the fibres, and keys of this program for them."""
+"""Keys of this program by the names of constants on data sheets, whose axis 1 is along the fibres."""
 
 
 def read_materials(
@@ -75,7 +75,7 @@ def fibre_phases(cell: object) -> tuple[str, ...] | None:
 
 
 def coating_faults(cell: Cell | None, materials: object) -> list[str]:
-    """List coatings without a material, and coating materials without coatings; [] for faulty sections or own mesh."""
+    """List coatings without a material, or the material without coatings; [] for faulty sections and user meshes."""
     if cell is None or cell.has_own_mesh or not isinstance(materials, dict):
         return []
     has_coatings = cell.coating is not None if cell.table is None else bool((cell.table.coating > 0).any())
@@ -122,7 +122,7 @@ def _read_material(
 
 
 def _known_stress(material: material_forms.Material, plane: str | None) -> None:
-    """Raise ValueError if the constants leave S33 open; skip `plane` None and plane states with spatial stiffness."""
+    """Raise ValueError if constants leave S33, which a strength needs, open in the plane state (None: no check)."""
     is_plane = plane is not None and not voigt.PLANE_STATES[plane].is_spatial
     if is_plane and np.isnan(laws.out_of_plane(material, str(plane))[0]).any():
         raise ValueError("strength: needs S33, which the constants do not give; set a 6x6 stiffness or more constants")
@@ -143,9 +143,9 @@ def missing_expansions(tables: object, needed_by: str) -> list[str]:
 
 
 def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
-    """List moduli that seem to have different units, and expansions above 1 %, one per line.
+    """List moduli that seem to have different units, and expansions above 1 % per degree, one per line.
 
-    The ratio of GPa to MPa bounds two moduli in one phase, and fibre to matrix; no fibre is softer than the matrix.
+    Suspect are a ratio of 1000 (GPa / MPa) in one phase, and fibres softer or over 1000 times stiffer than the matrix.
     """
     lines, largest, gpa_to_mpa = list[str](), dict[str, float](), 1e3
     for phase, material in materials.items():

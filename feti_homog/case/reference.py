@@ -86,13 +86,13 @@ AXIS = KeyRow("SECTION.KEY", sections.AXIS_EXPECTED, "", "", "", sections.AXIS_M
 
 
 def tables(word: str = "", results: Sequence[str] = ()) -> list[TableReference]:
-    """Return key tables in `ORDER`: all without a `word`, the tables of the section `word`, or tables with the word.
+    """Return tables of the reference in `ORDER`: all of them or, with a `word`, only tables that match it.
 
-    The search in names and descriptions of keys and sections ignores case, and treats underscores as spaces. A table
-    has only the keys with the word, unless its name has the word.
+    A section name matches all tables of the section. Any other `word` is searched in names and descriptions; case is
+    ignored, underscores count as spaces. A table whose own name does not match keeps only its matching keys.
 
     Raises:
-        CaseError: no key or section has the word, and `results`, the lines on results with the word, is empty.
+        CaseError: nothing matches, and `results`, the lines on results with the word, is empty.
     """
     ranges, measured = _rows(sections.SWEEP, sections.RANGE_KEYS), f"[{sections.MEASURED}]"
     references = [
@@ -129,7 +129,7 @@ def _has(word: str, *texts: str) -> bool:
 
 
 def text(word: str = "", results: Sequence[str] = ()) -> str:
-    """Write an index and the reference or, with a `word`, matching tables and `results`.  Raises like `tables`."""
+    """Return index and reference or, with a `word`, matching tables and `results`, as text.  Raises like `tables`."""
     references = tables(word, results)
     if word:
         described = "\n".join(textwrap.fill(line, WIDTH, subsequent_indent=6 * " ") for line in results)

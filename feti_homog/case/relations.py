@@ -1,4 +1,4 @@
-"""Read the [interface] sections, and check relations between section values: faults, and remarks on loads."""
+"""Read the [interface] sections, find contradictions between keys or sections, and write remarks on loads."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -23,7 +23,10 @@ COMMON = tuple(name for name, entry in keys.keys_of(InterfaceSection).items() if
 
 
 def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
-    """List contradictions between valid section values; `plane` is None if the case has no valid plane state."""
+    """List faults that no single key shows, such as loads of zero, repeated waypoints and missing expansions.
+
+    `sections` are the fields of `Case`, None if faulty or absent; `plane` is None if no plane state is valid.
+    """
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
     faults, heated = list[str](), []
     if load is not None and not any(load.to.named.values()):
@@ -62,7 +65,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 def axes_lines(
     kind: str, section: load_sections.AnalysisSection, materials: Mapping[str, material_forms.Material], plane: str
 ) -> tuple[str, ...]:
-    """Return a remark on axes that may be taken for ply axes; () without such axes or generalized plane strain."""
+    """Return (remark,) if axes may be mistaken for ply axes, else (); always () except in generalized plane strain."""
     if plane != voigt.GENERALIZED.name:
         return ()
     from feti_homog.materials import engineering_constants  # needed only in generalized plane strain
@@ -79,7 +82,7 @@ def axes_lines(
 def stress_free(
     section: str, placed: Mapping[str, load_sections.Strain | load_sections.MixedLoad], plane: str
 ) -> tuple[str, ...]:
-    """List the components that loads leave free of stress, one line per waypoint."""
+    """List components that stay free of stress, always or until a waypoint names them, one line per waypoint."""
     first = load_sections.first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free before the leg to {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
@@ -87,9 +90,9 @@ def stress_free(
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Read the interface sections in file order; return None for unreadable or too many sections.
+    """Read the [interface] sections in file order; None if one is faulty or there are too many, () without any.
 
-    Each section gets its law as `criterion`, and numbers from its branch. Faults, also contradictions, go to `reader`.
+    `criterion` gets the name of the law; a softening branch gives missing constants. Faults go to `reader.faults`.
     """
     tables = interface_tables(document)
     if document.get("interface") == []:
@@ -132,7 +135,7 @@ def _written(value: Any) -> str:
 
 
 def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
-    """Replace unlimited strengths under a cohesive law by 1e4 times the normal constants of bonds that break."""
+    """Return the sections; bonds without constants, which hold, get 1e4 times the normal ones of breaking bonds."""
     names = (*STIFFNESSES, *COHESIVE)
     breaking = next((bond for bond in interfaces if all(getattr(bond, name) for name in names)), None)
     if breaking is None:
@@ -144,8 +147,8 @@ def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
 def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
     """Derive missing normal stiffness, strength and toughness from a softening branch; {} without a valid branch.
 
-    The branch begins at its peak, with opening delta_1 and traction t_1: k_n = t_1 / delta_1, N = t_1, and G_n is the
-    area under the elastic line and the branch.
+    The branch begins at its peak, with opening delta_1 and traction t_1: the stiffness is t_1 / delta_1, the strength
+    t_1, and the toughness the area under the elastic line and the branch.
     """
     openings, tractions = interface.openings, interface.tractions
     if BRANCH[0] not in LAWS[interface.criterion].keys:
@@ -160,10 +163,7 @@ def _of_branch(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of an interface section: softening numbers, toughnesses out of range, and friction.
-
-    `table` is the section as in the file; a separate rule reports its missing keys.
-    """
+    """Yield the faults of an interface section, which is `table` in the file: softening, toughness and friction."""
     law, words = LAWS[interface.criterion], f"friction = {interface.friction:g}: expected 0 with"
     if law.softens:
         needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
@@ -193,7 +193,7 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """List the friction keys without effect at zero friction, one per line."""
+    """List the interfaces with friction_on_damage = true but zero friction, one line each."""
     idle = [label for label, each in labelled(interfaces) if each.friction_on_damage and each.friction == 0.0]
     return [f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle]
 

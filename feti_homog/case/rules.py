@@ -1,4 +1,4 @@
-"""Define relations between keys in a case file: requirements, exclusions, and the lines of their faults."""
+"""Define the rules between keys of a case file, such as requirements and exclusions, and the text of their faults."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -38,11 +38,11 @@ class Rule:
     """A requirement on the value at a document path, under some conditions.
 
     Attributes:
-        path: names from the section to a table or value; the rule holds without a value. Empty: the whole document.
+        path: names from the section to a table or value; without a value there, the rule holds. Empty: the document.
         holds: test of the value; None if the path must not have a value.
-        words: end of the fault line: the expectation, or a function of value and selection that returns this end.
+        words: end of the fault line, or a function of the value and the selected options that returns this end.
         when: conditions; the rule applies if all hold.
-        names: keys in the fault, only keys in the table if the table has any of them; empty: the fault shows the value.
+        names: keys in the fault line; if the table has some of them, only these. Empty: the line shows the value.
     """
 
     path: TablePath
@@ -52,7 +52,7 @@ class Rule:
     names: tuple[str, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: keys.Selected) -> Iterator[str]:
-        """Yield one line for each invalid value in the document; sections in a list are numbered from 1."""
+        """Yield one line for each value that breaks the rule; sections are numbered from 1, items of a list from 0."""
         if not all(condition.holds(selected) for condition in self.when):
             return
         content = document.get(self.path[0]) if self.path else document
@@ -105,9 +105,9 @@ def needed(
 def belonging(
     path: TablePath, condition: keys.Condition, values: Sequence[str], *when: keys.Condition, instead: str = ""
 ) -> Rule:
-    """Return the rule that refuses the key or section at `path` unless `condition` holds.
+    """Return the rule that refuses the key or section at `path` unless the selector has a value of `condition`.
 
-    The rule applies under the conditions `when`. `values` are all values of the selector; `instead` is a replacement.
+    The rule applies under the conditions `when`. `values` are all values of the selector; the fault advises `instead`.
     """
     others = tuple(value for value in values if value not in condition.values)
 
@@ -119,7 +119,7 @@ def belonging(
 
 
 def _values(selector: keys.Selector) -> Sequence[str]:
-    """Return all values of a selector."""
+    """Return the valid values of a selector."""
     return keys.keys_of(SECTIONS[selector.section])[selector.key].type.options
 
 
@@ -201,7 +201,7 @@ def _files() -> Iterator[Rule]:
 
 
 def _refused(name: str, values: types.ValueType, ways: str, condition: keys.Condition) -> Rule:
-    """Return the rule that refuses some values of a key of [cell] under a condition."""
+    """Return the rule that refuses `values` of the [cell] key `name` under a condition and advises the other `ways`."""
     line = f"expected {ways} for {condition.in_words('cell')}"
     return Rule((*CELL, name), lambda value: not values.accepts(value), line, (condition,))
 
@@ -243,7 +243,7 @@ def _bonds() -> Iterator[Rule]:
 
 
 def _any_section(test: types.Test, document: Any) -> bool:
-    """Return whether an [interface] section passes a test or is not a table; true without the key `interface`."""
+    """Return whether any [interface] section passes `test` or is no table; True without the key `interface`."""
     tables = interface_tables(document)
     return "interface" not in document or any(not isinstance(table, dict) or test(table) for table in tables)
 
@@ -254,7 +254,7 @@ def _some_arc(table: Any) -> bool:
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether bonds can break: by a finite strength, or by a law that always has a limit."""
+    """Return whether bonds can break: by a finite one of the `strengths`, or by a law that always has a limit."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, types.INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))

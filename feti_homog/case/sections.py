@@ -277,11 +277,11 @@ KEY_OWNERS = {
     for table in TABLES
     for name in keys.keys_of(table.contents)
 }
-"""The tables of each key, in words."""
+"""The tables that have a key, in words, by key name."""
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """Return the options in [petsc], {} if it is no table, and append faults; runs check the values of options."""
+    """Return all options in [petsc], also faulty ones; {} if it is no table.  Append faults; runs check the values."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {wording.toml_value(table)}: expected a section [petsc]")
         return {}

@@ -1,4 +1,4 @@
-"""Read the document of a case, nested tables of TOML types, from a file or from Python and NumPy values."""
+"""Read the document of a case (nested dictionaries of TOML types) from a file, or from Python and NumPy values."""
 
 import copy
 import hashlib
@@ -24,7 +24,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """Read TOML; its default `name` is the file name without suffix.  Raises CaseError if it is no readable TOML."""
+    """Read a TOML file; its stem is the default `name`.  Raises CaseError if unreadable, too large or no TOML."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -62,7 +62,7 @@ def to_document(values: object) -> dict[str, Any]:
     """Convert Python and NumPy values to TOML types.
 
     NumPy scalars become numbers, arrays and tuples become lists, paths become strings. Values of other types stay
-    unchanged: the keys refuse them.
+    unchanged: `TableReader` reports them.
 
     Raises:
         TypeError: the values are not a mapping.
@@ -108,9 +108,9 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str], depth: int = 0) -> A
 def leaves(
     table: Mapping[str, Any], is_value: Callable[[TomlPath, Any], bool] | None = None, above: TomlPath = ()
 ) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield the paths and values of all leaves in a nested table.
+    """Yield the path and the value of each leaf in a nested table; every path begins with `above`.
 
-    Dotted keys are split. An empty table, or a table that passes `is_value`, is a leaf.
+    A key "a.b" gives two names in the path. An empty table, or a table with is_value(path, table), is a leaf.
     """
     for name, value in table.items():
         path = (*above, *name.split("."))
@@ -121,7 +121,7 @@ def leaves(
 
 
 def in_lists(path: TomlPath) -> TomlPath:
-    """Split the last name Cij of a stiffness path into row and column; other paths do not change."""
+    """Replace the name "Cij" at the end of a stiffness path by row "i" and column "j"; return other paths unchanged."""
     entry = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == ("stiffness",) else None
     return path if entry is None else (*path[:-1], *entry.groups())
 
@@ -132,8 +132,8 @@ def with_values(
     """Return a copy of a document with other values at some paths.
 
     A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
-    of several sections or an entry of a list; Cij stands for both entries of a stiffness.  The first fault, which
-    begins with `place`, is appended to `faults`, and later values are left out.
+    of several sections or an entry of a list; "Cij" sets C_ij and C_ji of a stiffness.  At the first fault, a line that
+    begins with `place` is appended to `faults`, and the copy is returned without the later values.
     """
     document = copy.deepcopy(dict(base))
     for path, value in values.items():
@@ -167,17 +167,17 @@ def with_values(
 
 
 def _one_of(table: Any, name: str) -> Any:
-    """Return the entry of a list with one list or, unless `name` is a number, one table; else return `table`."""
+    """Return the only entry of a list if a path, which continues with `name`, omits its number; else return `table`."""
     is_one = isinstance(table, list) and len(table) == 1
     return table[0] if is_one and isinstance(table[0], list if name.isdecimal() else dict | list) else table
 
 
 def short_digest(content: bytes) -> str:
-    """Return the first 16 hexadecimal digits of a SHA-256 digest."""
+    """Return the first 16 hexadecimal digits of the SHA-256 digest of `content`."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _article(value: object) -> str:
-    """Return the type of a value with its article: "an int", "a list"."""
+    """Return the type name of a value with its article: "an int", "a list"."""
     name = type(value).__name__
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"

@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """A key of `section` that decides which other keys belong to the case; `word` may rename it in messages."""
+    """A key of `section` that decides which other keys belong to the case; messages call it `word`, if not empty."""
 
     section: str
     key: str
@@ -41,7 +41,7 @@ class Condition:
         return selected.get(self.selector) in self.values
 
     def in_words(self, section: str) -> str:
-        """Write the condition in a message about `section`: key = A or B, with [other] before a key from elsewhere."""
+        """Write "KEY = A or B"; "[SECTION] KEY = A or B" for a message about another `section` than the selector's."""
         word = self.selector.word or self.selector.key
         name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
         return f"{name} = {' or '.join(map(toml_value, self.values))}"
@@ -80,7 +80,7 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault of the key `name` in a table; empty without a fault.
+        """Return the fault of the key `name` in a table; an empty string without a fault.
 
         The text follows the name in a message. `only` is not checked; keys with conditions may be missing.
         """
@@ -102,9 +102,9 @@ def key(
 ) -> Any:
     """Return a dataclass field that holds the rules of the key with the field name.
 
-    Without `default` and `absent`, the key is required.  A missing key has the value None if it is required under
-    conditions, or has a meaning `absent`.  `default_words` replace the default in the reference.  `attributes` are
-    further attributes of `Key`.
+    Without `default` and `absent`, the key is required.  `absent` words the meaning of a missing key, whose value is
+    then None; a key that is required under conditions has None, too.  `default_words` replace the default in the
+    reference.  `attributes` are further attributes of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)
     default = None if absent else default

@@ -49,7 +49,7 @@ class ValueType:
     options: tuple[str, ...] = ()
 
     def complaint(self, value: Any) -> str:
-        """Return "expected ..." for an invalid value, empty for a valid value."""
+        """Return "expected ..." for an invalid value, an empty string for a valid value."""
         if self.accepts(value):
             return ""
         complaint = f"expected {self.expected}{hint(value)}"

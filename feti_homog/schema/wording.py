@@ -88,6 +88,6 @@ def suggestion(name: str, known: Collection[str], owners: Mapping[str, str]) -> 
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """Write a limit with the fewest digits, at least `digits`, that keep it at or below `value`; else all digits."""
+    """Write a limit with the fewest digits, at least `digits`, that keep it at or below the refused `value`."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

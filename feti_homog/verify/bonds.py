@@ -47,7 +47,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Describe a break under the traction (1, c), with the keys of envelope points."""
+        """Return the numbers of a break under the traction (1, c), with their keys in envelope points."""
 
     def jumps(self, traction: Float) -> Float:
         """Compute the jumps (k, c) of elastic bonds: traction / stiffness."""
@@ -63,7 +63,7 @@ class BondLaw(ABC):
         return np.zeros(len(psi))
 
     def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
-        """Compute energies per area absorbed in modes psi as damage rises from `before` to `after`.  All are (k,)."""
+        """Compute energies per area (k,) absorbed in modes psi as damage rises; for elastic bonds, `lost` in breaks."""
         return self.lost(psi)
 
     def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
@@ -76,16 +76,16 @@ class BondLaw(ABC):
         return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
-        """Compute energies per area (k, 2): G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a)."""
+        """Compute bond energies per area (k, 2): G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a)."""
         energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
         return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
     def shares(self, traction: Float) -> Float:
-        """Compute the ratios (k, c) of traction components to their strengths."""
+        """Compute the ratios <t_i> / R_i (k, c) of traction components to strengths."""
         return np.asarray(pulled(traction) / self._components("strength", traction))
 
     def _components(self, kind: str, traction: Float) -> Float:
-        """Return stiffnesses or strengths (`kind`), (c,) or (k, c): by default inf, axially the tangential value."""
+        """Return stiffnesses or strengths (`kind`), (c,) or (k, c); inf if missing, axial ones as tangential ones."""
         normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
         components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
         stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
@@ -96,11 +96,11 @@ class MaxStrength(BondLaw):
     """The law of the largest ratio: max_i <t_i> / R_i = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute max_i <t_i> / R_i (k,)."""
+        """Compute the utilisation max_i <t_i> / R_i (k,)."""
         return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the ratios <t_i> / R_i by component."""
+        """Return the ratios <t_i> / R_i under the keys "normal", "tangential" and, for c = 3, "axial"."""
         return dict(zip(("normal", "tangential", "axial"), self.shares(traction)[0].tolist(), strict=False))
 
 
@@ -108,21 +108,18 @@ class QuadraticStrength(MaxStrength):
     """The quadratic law: sum_i (<t_i> / R_i)^2 = 1 breaks the bond."""
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute sqrt(sum_i (<t_i> / R_i)^2) (k,)."""
+        """Compute the utilisation sqrt(sum_i (<t_i> / R_i)^2) (k,)."""
         return np.asarray(np.sqrt(np.square(self.shares(traction)).sum(axis=1)))
 
 
 class SpringEnergy(BondLaw):
-    """The energy law: G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
-
-    With toughness G_Ic, mode sensitivity lambda, G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a).
-    """
+    """The energy law: a bond breaks at G_I + G_II = G_Ic [1 + tan^2((1 - lambda) psi)], lambda = mode_sensitivity."""
 
     has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute sqrt((G_I + G_II) / G_c) (k,)."""
+        """Compute the utilisation sqrt((G_I + G_II) / G_c) (k,), see `energies` and `lost`."""
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
 
     def lost(self, psi: Float) -> Float:
@@ -131,7 +128,7 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(angle) ** 2))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the mode psi in degrees."""
+        """Return the mode psi in degrees under the key "psi"."""
         return {"psi": float(np.degrees(self.mode(traction))[0])}
 
 
@@ -151,7 +148,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
     """Return the bond law at `nodes`, p of the k interface nodes.
 
-    `damage` (k,), if not None, softens the law.  With several sections or scattered strengths, its numbers are (p,).
+    `damage` (k,), if not None, softens the law.  With several sections or scattered strengths, the constants are (p,).
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
@@ -175,7 +172,7 @@ def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
 def rubbing_force(files: ResultFiles, state: State) -> Float:
     """Compute the friction traction (k,) on the damaged fraction of unbroken bonds, 0 elsewhere.
 
-    With shear traction t, intact and damaged compliances C_0 and C, and slip C_0 t + g, it is t - g / (C - C_0).
+    It is t - g / (C - C_0) with shear traction t, slip C_0 t + g, and compliances C_0 (intact) and C (damaged).
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))

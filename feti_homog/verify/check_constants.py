@@ -18,7 +18,7 @@ RATIOS = ("eta", "anisotropy", "deviation")
 
 
 def check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Check tolerances of checks and contact, and that the status follows from checks, solver reasons and faults."""
+    """Check the tolerances, and that the status follows from checks, convergence reasons of the solver and faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
     # A tolerance from the command line is in no other entry, so that no law can check it.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
@@ -36,7 +36,8 @@ def check_status(findings: Findings, cell: DiscreteCell) -> None:
 def check_reciprocity(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check that stiffnesses are symmetric, and that the thermal stress S obeys Levin's formula.
 
-    It is S : E = -<alpha : L : eps> under a strain E.  Debonded cells with contact have no reciprocity and are skipped.
+    S : E = -<alpha : L : eps> with strains eps under a strain E, expansions alpha and stiffnesses L of the phases.
+    Debonded cells with contact have no reciprocity and are skipped.
     """
     document = cell.files.document
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
@@ -97,7 +98,7 @@ def check_constants(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_conductivity(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the closed forms of the conductivity and, without conductances, that it is within Wiener's bounds."""
+    """Check closed-form bounds and estimates; without conductances, Wiener's bounds must enclose the conductivity."""
     k, forms = np.array(cell.files.document["effective_conductivity"]), cell.files.document["conductivity_estimates"]
     share, (x1, _, x3) = cell.fractions, GRADIENT
     axial, across = cell.stiffnesses[:, x3, x3], cell.stiffnesses[:, x1, x1]
@@ -160,7 +161,7 @@ def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
 
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
-    """Compute k = C_iijj / 4 and mu = (C_ijij - C_iijj / 2) / 4 of the isotropic stiffness nearest to `c` (3, 3)."""
+    """Compute bulk modulus C_iijj / 4 and shear modulus (C_ijij - C_iijj / 2) / 4 nearest to a stiffness `c` (3, 3)."""
     spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
 

@@ -37,7 +37,7 @@ class Prescribed:
 
 
 def targets(case: Document) -> list[Prescribed]:
-    """Return the loads of a case, with all components.
+    """Return the loads of [path] or [load], with all components; [] for other analyses.
 
     A component that a load omits keeps its previous value and kind; initially stresses and temperature are 0.
     """
@@ -88,7 +88,7 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state with cohesive tractions, whose large `FIELDS` are empty arrays, so that all states fit in memory.
+    """A state whose `traction` is cohesive and whose large `FIELDS` are empty arrays, so that all states fit in memory.
 
     Attributes:
         stored, in_springs: energies per area: <sigma : (eps - alpha T)> / 2 plus springs, and springs alone.
@@ -175,7 +175,7 @@ def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales:
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
-    """Check the points or columns in result.json against the states."""
+    """Check points, or columns of a stiffness, in result.json against the states."""
     files, nodes, sections = cell.files, cell.files.interface, len(cell.files.interfaces)
     is_same = json.loads(str(files.file.attrs["case"])) == files.case
     findings.require("tables", is_same, "the case, which differs between the two files")

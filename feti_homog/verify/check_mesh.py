@@ -140,7 +140,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
 
 
 def _tangents(points: Float, frame: Float, places: Float) -> Float:
-    """Compute the tangents dx / dt (s, q, 2) of sides x(t), t in [0, 1], at `places` 2 t - 1 (q,).
+    """Compute the tangents dx / dt (s, q, 2) of sides x(t), t in [0, 1]; `places` (q,) are values of 2 t - 1.
 
     The nodes of the sides are `points` (s, n, 2), ends first.  A side is an elliptic arc, the image of a unit arc under
     its `frame` (s, 2, 2); without a frame (NaN) it is the circular arc through its three nodes, or straight.
@@ -183,7 +183,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Return masks (k,), inside arcs and outside all arcs, False at tips; `opening` is the default angle in degrees."""
+    """Return masks (k,), inside arcs and outside all arcs, both False at tips; `opening` is the default angle."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
@@ -197,7 +197,7 @@ def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
 
 
 def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: str) -> None:
-    """Check rates G = G_I + G_II + G_III, tan^2 psi = (G_II + G_III) / G_I, and places and lengths of tips."""
+    """Check release rates G = G_I + G_II + G_III, modes tan^2 psi = (G_II + G_III) / G_I, and places of crack tips."""
     rows, at = cell.files.interface, f"{where}, tip {{}}".format
     names = "G", "G_I", "G_II", "psi", "length", "angle", "fibre"
     G, opening, shear, psi, length, angle, number = (np.array(tips[name]) for name in names)
@@ -219,7 +219,7 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section, where: st
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that an energy error is not far below the sum of element errors; recompute the sum under unit loads."""
+    """Check that energy errors are at least LEAST_SHARE of summed element errors; under unit loads, check this sum."""
     document, total, error = cell.files.document, float(state.mesh_error.sum()), None
     if "path" in document or "load" in document:
         error = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")

@@ -99,7 +99,7 @@ def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) ->
 
 
 def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> StateNumbers:
-    """Check that `tips` of a point are the bonds beside broken bonds.  Tractions must give their modes and energies.
+    """Check that `tips` lists the bonds beside broken bonds, with modes and energies that follow from the tractions.
 
     Returns the state with the utilisation sqrt(G / toughness) of tips that break by energy release; G is in the file.
     """
@@ -130,10 +130,7 @@ def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tip
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the points of `envelope` in result.json by superposing the states under the unit loads.
-
-    Debonded nodes, and tips that break by energy release, have no utilisation.
-    """
+    """Check `envelope` by superposing the unit loads; tips that break by energy release have no utilisation."""
     document, keys, law = cell.files.document, cell.files.case["envelope"], law_at(cell.files)
     rows, points, n, status = cell.files.interface, document["envelope"], keys["directions"], states[0].status
     released = cell.tips(status) & law.grows_by_release

@@ -24,7 +24,7 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants, and derivatives along one change of all parameters."""
+    """Check the values of all constants, and their derivatives in one direction, in which all parameters change."""
     document = cell.files.document
     if "sensitivities" not in document:
         if cell.files.case.get("output", {}).get("sensitivities"):
@@ -172,7 +172,10 @@ def _place(case: Case, name: str) -> tuple[Any, str, tuple[int, ...]]:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """Compute <sigma_j : eps_i> plus springs, (v, v) or (6, 7), of strain states i and all states j, for a `case`."""
+    """Compute the matrix <sigma_j : eps_i> plus spring work between states, (v, v) or (6, 7), for a `case`.
+
+    Rows i are the states under strains, in the order of components; columns j end with the state under temperature.
+    """
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     x, V = files.mesh.points, np.zeros_like(files.mesh.points)

@@ -61,7 +61,7 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
 
 
 def check_gluing(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check that copies of a node have equal fluctuations, and that forces balance.
+    """Check that copies of a node have equal fluctuations u*, and that forces balance.
 
     Forces on faces balance the traction; on the sides of the cell they balance Sigma n if prescribed, and prescribed
     displacements are E x.  The reaction of the fixed node, u* = 0, contains the rounding of all nodes.

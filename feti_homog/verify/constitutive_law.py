@@ -71,7 +71,10 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def rounding(case: Mapping[str, Any], phases: Sequence[str], stiffnesses: Float) -> tuple[float, float]:
-    """Bound rounding of stresses, 6 eps max S_iijj / (3 min eig S) for compliances S, and of work, 6 eps contrast."""
+    """Bound the relative rounding of stresses, 6 eps times a condition, and of work, 6 eps times the contrast.
+
+    eps is the machine precision, the condition the largest S_iijj / (3 min eig S) of all phase compliances S.
+    """
     constants = [] if case["analysis"]["plane"] == "conduction" else [phase_constants(case, name) for name in phases]
     compliances = [_compliance(phase) for phase in constants]  # incompressible phases have limits of pressures
     condition = max((S[:3, :3].sum() / 3 * np.linalg.norm(np.linalg.inv(S), 2) for S in compliances), default=1.0)
@@ -83,7 +86,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     """Compute matrices (phases, 2, 3) from [S11, S22, S12] to [S33, E33].
 
     E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with compliances s and stresses S' in material axes; S33 or E33 is 0.
-    The row of the other is NaN if the constants do not determine it.  Raises like `laws`.
+    The row that is not 0 is NaN if the constants do not determine it.  Raises like `laws`.
     """
     plane, rules = case["analysis"]["plane"], []
     beside_E1 = ["nu13", "nu23", "E3"] if plane == "strain" else ["nu13", "nu23"]

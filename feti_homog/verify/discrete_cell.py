@@ -154,7 +154,7 @@ class DiscreteCell:
 
     @cached_property
     def directions(self) -> Float:
-        """Compute directions (k,) in degrees from the fibre centres to the interface nodes."""
+        """Compute directions (k,) in degrees from the fibre centres to the interface nodes; NaN without a centre."""
         rows = self.files.interface
         x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.shift).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
@@ -167,7 +167,7 @@ class DiscreteCell:
         return np.asarray(angle + 360.0 * (angle <= -180.0 + ROUNDING))
 
     def in_axes(self, vectors: Float) -> Float:
-        """Transform vectors (k, c) from normal, tangential (-n2, n1), axial to x1, x2, x3 components."""
+        """Transform vectors (k, c) from components along normal n, tangent (-n2, n1) and fibre to x1, x2 and x3."""
         n1, n2 = self.files.interface.normal.T
         normal, tangential, *axial = vectors.T
         return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
@@ -183,7 +183,7 @@ class DiscreteCell:
         return self.integrals(self.sides.on_side)
 
     def integrals(self, which: Bool) -> Float:
-        """Compute int N_a n ds (nodes, 2) over the sides `which`.  N_a are shape functions, n normals inwards.
+        """Compute integrals int N_a n ds (nodes, 2) over the sides `which`: shape functions N_a, normals n inwards.
 
         On a side this is sum_b int N_a dN_b/ds x_b with nodes x_b, rotated to the normal.
         """

@@ -54,7 +54,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Return the largest lambda / mu and contrast max(mu) / mu of mixed phases; (0, 0) without mixed phases."""
+        """Return the largest lambda / mu (Lame's constants) and max(mu) / mu of mixed phases; (0, 0) without any."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -72,7 +72,7 @@ class Elements:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """Compute int dN_a/dx (n, 2) over the elements at every node a."""
+        """Compute integrals int dN_a/dx (n, 2) of shape function gradients over the elements at each node a."""
         sums = np.zeros_like(self._mesh.points)
         for part, gradients, weights in self._parts():
             add_at_nodes(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
@@ -81,7 +81,7 @@ class Elements:
     def fields(self, displacement: Float, terms_of_u: Float, along: float, free: Float) -> ElementFields:
         """Compute the fields of displacements (n, c).
 
-        `terms_of_u` (n, c) has the sizes of the terms in u, `along` is E33, `free` (phases, v) has thermal strains.
+        `terms_of_u` (n, c): sizes of the terms in u; `along`: as in `State`; `free` (phases, v): thermal strains.
         """
         m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
         strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
@@ -106,7 +106,7 @@ class Elements:
     def responses(
         self, displacement: Float, along: float, free: Float
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
-        """Yield slices of elements, with gradients, weights, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
+        """Yield slices, gradients and weights as in `_parts`, du/dx (e, q, c, 2), strains and stresses (e, q, v)."""
         v = self._stiffnesses.shape[1]
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]
@@ -151,7 +151,7 @@ class Elements:
 
 @cache
 def quadrature_points() -> Float:
-    """Return points (6, 3), the cycles of (1 - 2 b, b, b): 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
+    """Return barycentric points (6, 3), cycles of (1 - 2 b, b, b): 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
     spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
     for sign in (1.0, -1.0):
         b = (8 - np.sqrt(10.0) + sign * spread) / 18

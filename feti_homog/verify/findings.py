@@ -103,7 +103,7 @@ class Findings:
         self.record(law, 0.0 if holds else np.inf, where)
 
     def worst(self) -> tuple[Finding, ...]:
-        """Return the largest violations of all laws that apply, in the order of `checks`."""
+        """Return the finding with the largest violation of each law that applies, in the order of `checks`."""
         return tuple(self._worst[name] for name in self._checks if name in self._worst)
 
 
@@ -121,7 +121,7 @@ def solver_limit(rtol: float) -> float:
 def checks(rtol: float, users_mesh: bool, phases: Sequence[float] = (0, 0, 0, 0)) -> list[Finding]:
     """List the laws with their limits for a tolerance `rtol` of the dual problems, without violations.
 
-    Users' meshes widen the limits, and so do `phases`: two `Elements.contrasts`, then two of `rounding`.
+    Users' meshes widen the limits, and so do `phases`: both numbers of `Elements.contrasts`, then both of `rounding`.
     """
     ratio, contrast, of_law, of_contrast = phases[0] / LARGE_RATIO, *phases[1:]
     # Factors by which nearly incompressible phases raise the limits.
@@ -201,9 +201,9 @@ COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "disp
 
 
 class Section(dict[str, Any]):
-    """A table of result.json that records the entries that laws read.  ATOMS count as one entry.
+    """A table of result.json that records which entries laws read.  ATOMS count as one entry.
 
-    `places` has the names of all entries in the outermost table, and none in tables inside.
+    `unread` maps unread entries to whether laws leave them open; the outermost table has all entries in `places`.
     """
 
     def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:

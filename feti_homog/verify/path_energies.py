@@ -35,7 +35,7 @@ from feti_homog.verify.reading import Status
 class PointNumbers:
     """The strains and stresses (n,), stored energy per area and load at a path point.
 
-    Strains and stresses end with the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
+    With n = 7, the last ones are the temperature and its conjugate, NaN if unknown; `terms` scales energies per area.
     """
 
     name: str
@@ -160,7 +160,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
 
 
 def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
-    """Maximize t power - t^2 energy over t >= 0 with load = t unit.  Returns -inf if no t fits, or for NaN."""
+    """Maximize t power - t^2 energy over all t >= 0 with load = t unit; return -inf if no t fits, or for NaN."""
     if not (load.any() or unit.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:
@@ -173,7 +173,7 @@ def _largest(power: float, energy: float, load: Float, unit: Float) -> float:
 
 
 def _work(prescribed: Float, conjugate: Float) -> float:
-    """Compute prescribed.conjugate without terms where `prescribed` is 0.  There `conjugate` may be NaN."""
+    """Compute the dot product of the arguments without terms where `prescribed` is 0; `conjugate` may be NaN there."""
     return float(prescribed[prescribed != 0.0] @ conjugate[prescribed != 0.0])
 
 
@@ -181,8 +181,7 @@ def check_losses(findings: Findings, cell: DiscreteCell, states: States) -> None
     """Check the work, and the loss in breaks by (P).
 
     The loss is the potential with old bonds minus the potential with new bonds, at the load of the break: after an
-    event point, or at the end of an increment.  There, Voigt's mean stiffness at the new strain stores at least as much
-    as old bonds.
+    event point, or at the end of an increment.  In increments, Voigt's stiffness bounds the energy of old bonds, too.
     """
     points, by_events = cell.files.document["path"], cell.files.case["path"]["method"] == "events"
     of_point, loads = {state.point: state for state in states}, at_points(cell.files.case, points)

@@ -148,7 +148,7 @@ class ResultFiles:
 
     @property
     def boundary(self) -> str:
-        """Return the conditions on the sides of the cell."""
+        """Return the conditions on the sides: "periodic", "displacement" or "traction"."""
         return str(self.case["cell"].get("boundary", "periodic"))
 
     @property
@@ -216,7 +216,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Context manager: open the results in a folder.  Raises CaseError; OSError, KeyError for a fault in result.h5."""
+    """Context manager: open a result folder.  Raises like `altered`; OSError or KeyError for a faulty result.h5."""
     changed, path = altered(directory), directory / FIELDS
     with h5py.File(path, "r") as file:
         tables = {

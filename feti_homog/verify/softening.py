@@ -39,7 +39,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(super().jumps(traction) / shares)
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute delta / (delta at the next tooth) (k,)."""
+        """Compute the utilisation (k,): opening delta / delta at the next tooth."""
         level = np.abs(np.subtract.outer(np.broadcast_to(self.damage, len(traction)), self.levels)).argmin(axis=1)
         level = np.minimum(level, len(self.levels) - 2)
         low, high = self.levels[level], self.levels[level + 1]
@@ -60,7 +60,7 @@ class Cohesive(QuadraticStrength):
         return super().utilisation(traction)
 
     def shares(self, traction: Float) -> Float:
-        """Compute traction / strength (k, c), slips times sqrt(k_t / k_c): slips of equal energy have equal shares."""
+        """Compute t_n / N, t_t / S and sqrt(k_t / k_a) t_a / S (k, c) for the strengths N and S of first damage."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -70,7 +70,7 @@ class Cohesive(QuadraticStrength):
 
     @cached_property
     def levels(self) -> Float:
-        """Compute damage levels (n + 1,) of n teeth at openings in one ratio, in the mode with larger end / onset."""
+        """Compute damage levels (n + 1,) of n teeth at openings in geometric progression, in the more ductile mode."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
@@ -93,7 +93,7 @@ class Cohesive(QuadraticStrength):
     @property
     @abstractmethod
     def last(self) -> float:
-        """Return u at the end of the branch, or at the beginning of its last tooth."""
+        """Return u at the end of the branch or, if it has no end, at the beginning of its last tooth."""
 
     @abstractmethod
     def branch(self, u: Float) -> Float:
@@ -107,7 +107,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """Compute K, delta_0 and stretch = (G_c - K delta_0^2 / 2) / (K delta_0 under(inf)) (k,) in modes psi (k,)."""
+        """Compute K, delta_0 and the stretch for which t(delta) absorbs the toughness, all (k,), in modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt
@@ -121,7 +121,7 @@ class Cohesive(QuadraticStrength):
         return K, first, rest / (K * first * self.under(np.asarray(np.inf)))
 
     def _area(self, d: Float, K: Float, first: Float, stretch: Float) -> Float:
-        """Compute the area (k,) under t(delta) up to damage d (k,), minus the energy that unloading returns."""
+        """Compute the area (k,) under t(delta) up to damage d (k,), less the energy of unloading; see `_mode`."""
         low = np.zeros(np.broadcast_shapes(np.shape(d), np.shape(first)))
         high = low + 1.0
         while ((1.0 - d) * (first + stretch * high) < first * self.branch(high)).any() and high.max() < 1e6:

@@ -1,4 +1,4 @@
-"""Express the effective material of a result in card axes (axis 1 along the fibre); write conductor cards.
+"""Express the effective material of a result in card axes (axis 1 along the fibre); write cards of conductivities.
 
 Abaqus Keywords Guide and CalculiX user's manual, *CONDUCTIVITY, TYPE=ORTHO: k11, k22, k33.  ANSYS: KXX, KYY, KZZ.
 """
@@ -21,7 +21,7 @@ FIBRE_FIRST = (2, 0, 1)
 PAIRS: list[tuple[int, ...]] = [(int(name[1]) - 1, int(name[2]) - 1) for name in voigt.SPATIAL_STRESSES]
 """The pairs of axes of Voigt's order [11, 22, 33, 23, 13, 12]."""
 ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
-"""The indices of a card's components in the order of the cell: C_card = C_cell[ORDER][:, ORDER]."""
+"""The cell's Voigt components in the order of a card: C_card = C_cell[ORDER][:, ORDER]."""
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) entries at which the stiffness of an orthotropic material is 0 in material axes."""
 COUPLINGS[:3, :3] = False
@@ -45,7 +45,7 @@ class EffectiveMaterial:
         name: case name.
         version: program version.
         stress_unit: the case's label, empty if it has none.
-        symmetry: a sentence for the comments of a card.
+        symmetry: statement on the material symmetry, for the comments of a card.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite; axes 2 and 3 are x1 and x2 of the cell.
         expansion: (6,) strains per unit of temperature in the same order, or None.
@@ -79,9 +79,9 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
-    """Return the material of a result with stiffness and expansion as computed.
+    """Return the material of a result as computed, with its components renumbered to card axes.
 
-    Shears are uncoupled, and the material orthotropic, if their couplings and expansions are within NEGLIGIBLE.
+    If the couplings and expansions of shears are all within NEGLIGIBLE, they are set to 0: the material is orthotropic.
     Raises CaseError if the result has no linear spatial stiffness, or did not converge; KeyError, TypeError or
     ValueError if it is damaged.
     """
@@ -172,7 +172,7 @@ def numbers(value: Any, shape: tuple[int, ...]) -> Float:
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """Return the comment lines at the start of a card, in ASCII, each after `mark`."""
+    """Return the comment lines at the start of a card, in ASCII, each beginning with `mark`."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -200,7 +200,7 @@ def number(value: float) -> str:
 
 
 def identifier(name: str) -> str:
-    """Convert a name to at most 60 letters, digits and single underscores.
+    """Convert a name to at most 60 letters, digits and single underscores, which replace all other characters.
 
     The prefix `material_` comes before an identifier that does not begin with a letter.
     """

@@ -55,7 +55,7 @@ def abaqus(
     """Return the Abaqus card, with the keywords *MATERIAL, *ELASTIC and *EXPANSION.
 
     An anisotropic material has TYPE=`anisotropic` and 21 entries, an expansion with shears TYPE=ANISO.  `shears` (6,)
-    multiplies the strains with engineering shears.
+    are factors from engineering shears to the shears of the card.
     """
     lines = effective_material.comments(material, "**")
     lines.append(f"*MATERIAL, NAME={effective_material.identifier(material.name)}")
@@ -79,7 +79,7 @@ def abaqus(
 
 
 def calculix(material: effective_material.EffectiveMaterial) -> str:
-    """Return the CalculiX card: Abaqus' keywords with another name of the type, and with the tensor's shears."""
+    """Return the CalculiX card: as for Abaqus, but with ANISO for ANISOTROPIC, and the tensor's shears of expansion."""
     return abaqus(material, "ANISO", TENSOR_SHEARS)
 
 

@@ -35,7 +35,7 @@ FLAT = 0.02  # standard deviation in each phase / largest stress, below which co
 
 
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the materials of the cell with the fibre numbers.
+    """Draw the materials of the cell with the fibre numbers and the initially debonded arcs.
 
     The figure also has the strength factors of the fibres if a factor is not 1.
     """
@@ -72,7 +72,7 @@ def _cyclic_colours(count: int) -> Array:
 
 
 def partition(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw the subdomains, coloured one by one or, on several ranks, by rank.
+    """Draw the subdomains, coloured one by one or, if the run had several ranks, by rank.
 
     A subdomain across materials counts once for each body.  More than `IN_LEGEND` colours are pale, with numbers.
     """
@@ -155,7 +155,7 @@ def _title(attributes: Any, text: str) -> str:
 
 
 def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write the fibre numbers onto the drawn fibres.  More than 2000 fibres get none.
+    """Write the fibre numbers onto the drawn fibres; write nothing in a cell of more than 2000 fibres.
 
     The cell sides may cut a round fibre; every part of the fibre then gets the number.
 

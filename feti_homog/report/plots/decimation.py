@@ -1,6 +1,6 @@
-"""Read the mesh of result.h5, coarsened for pictures, and its fields.
+"""Read the mesh and the fields of result.h5, coarsened for pictures.
 
-The coarse mesh has at most TRIANGLE_LIMIT triangles where the nesting allows; the file is read in blocks.
+Refinements are undone until at most TRIANGLE_LIMIT triangles are left, if possible; the file is read in blocks.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # the quarter
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """The triangles of a picture: file triangles, or coarse triangles of `group` file triangles."""
+    """The q triangles and p nodes of a picture: `group` file triangles make one, or one of them makes `pieces`."""
 
     block: int  # rows of a table read at once
     group: int
@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Number the distinct positions in each body, for all nodes (p,).  Torn nodes share a number."""
+        """Return a position number for each node (p,), shared by nodes of one body at the same position."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
@@ -58,7 +58,7 @@ class DrawnMesh:
 def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> DrawnMesh:
     """Read a mesh for pictures from an open result.h5, `block` table rows at a time.
 
-    The mesh is the finest nested mesh with at most `limit` triangles, or else the coarsest nested mesh.
+    The mesh is the finest refinement level with at most `limit` triangles, or else the coarsest level.
     """
     table = file["mesh/triangles"]
     refine, curved = int(file.attrs["refine"]), table.shape[1] == 6
@@ -102,9 +102,9 @@ def node_means(values: Array, drawn: DrawnMesh) -> Array:
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
-    """Return the outline edges (e, 2) of the triangles with equal labels.
+    """Return the edges (e, 2) that bound each group of triangles with an equal `label` (q,).
 
-    An edge between two labels occurs once on either side.  Nodes are torn, so an edge with one triangle is on a
+    An edge between two groups occurs once on either side.  Nodes are torn, so an edge with one triangle is on a
     subdomain border; the edge has a coincident twin across that border, but no twin on the cell border.
     """
     edges = np.concatenate([drawn.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
@@ -152,7 +152,7 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
-    """Return the largest factor s of displacements u (p, 2) at which no drawn triangle turns over.
+    """Return the largest factor s of displacements u (p, 2) at which each triangle keeps LEAST_AREA of its area.
 
     For all s' up to s, det(I + s' grad u) = 1 + s' tr(grad u) + s'^2 det(grad u) >= LEAST_AREA in every drawn triangle.
     The result is infinite if every factor is possible.

@@ -71,14 +71,14 @@ class DeformedCell(drawn_cell.DrawnCell):
         return self.file[f"state/{number}"]
 
     def moved(self, number: int) -> Array:
-        """Return the positions (p, 2) of the drawn nodes in a deformed state."""
+        """Return the positions (p, 2) of the drawn nodes in state `number`, displaced by `scale` times u."""
         places: Array = self.drawn.points + self.scale * decimation.drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell in state `number`, with its nodes at `moved` (p, 2).
 
-        Returns the coloured triangles.  The end of a path has its own colours at more than twice the earlier stresses.
+        Returns the coloured triangles.  The end of a path has its own colours above twice the earlier stresses.
         """
         state, (norm, colours, _) = self.state(number), self.colours
         norm = Normalize(norm.vmin, norm.vmax)  # a shared one would call the artists of earlier frames
@@ -126,7 +126,7 @@ def draw_state(
     The state has index `number` in `out`/result.h5.  Call on one rank.  Returns the caption.
 
     `stress` is a component such as "S11", by default along the largest strain; `scale` multiplies displacements.
-    Colours go from minus `most` to `most`, so that pictures can have one scale; by default they suit the state.
+    Colours go from minus `most` to `most`, so that pictures can share their colours; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.  Raises FetiHomogError if
     result.h5 cannot be read, or has no such state.
@@ -154,7 +154,7 @@ def shown_scale(file: Any, document: Document) -> float:
     """Return the displacement factor for all pictures of an `angle` or `path` analysis.
 
     The case may give the factor; by default the largest displacement and opening are visible and no triangle turns
-    over, but the factor is at least 1 under a load of the case.
+    over, but the factor is at least 1 if the case gives the load.
     """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
@@ -175,7 +175,7 @@ def shown_scale(file: Any, document: Document) -> float:
 
 
 def shown_states(document: Document, most: int, count: int) -> list[int]:
-    """Choose at most `most` of the `count` states for the pictures.
+    """Choose at most `most` of `count` states for pictures, and return their indices.
 
     The states are at the path landmarks, or else evenly spaced, with equal steps if `count` allows.
     """
@@ -238,7 +238,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 
 def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
-    """Write the states along a path to `path` as an animated GIF.  All frames have the layout of the last state."""
+    """Write the states along a load path to the file `path` as an animated GIF, all frames in the last one's layout."""
     numbers = shown_states(document, MAX_FRAMES, len(file["state"]))
     cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
@@ -263,7 +263,7 @@ def animation(file: Any, document: Document, scale: float, path: Path) -> Path:
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the lower left and upper right corners around all states, with a margin."""
+    """Return the lower left and upper right corners around the node positions (p, 2) of all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

@@ -39,7 +39,7 @@ class InterfaceEdges:
 
     @classmethod
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
-        """Find the interface edges among the body outlines.
+        """Find the interface edges among the body outlines `borders` (b, 2).
 
         All periodic images of an interface node share one row in /interface.
         """
@@ -89,7 +89,7 @@ class DrawnCell:
 
     @classmethod
     def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
-        """Read the cell of an open result.h5, coarsened to `limit` triangles where the nesting allows."""
+        """Read the cell of an open result.h5, coarsened to `limit` triangles if its refinement allows."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
@@ -141,7 +141,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
     """Add a colour bar for `shapes` to the right of the axes; return the bar.
 
-    The bar is 1/25 of the longer side of the cell wide, as high as the cell, and at least 1/4 of the longer side high.
+    The bar is as high as the cell, and at least 1/4 of the longer cell side; its width is 1/25 of the longer side.
     """
     figure: Any = axes.figure
     sides: Any = axes.dataLim.size
@@ -155,7 +155,7 @@ class LoadLabels:
     """The labels of loads for the states of a result.
 
     Attributes:
-        leading: component of the leading strain of a path; None for other analyses.
+        leading: index of the leading strain of a path; None for other analyses.
         least_stress: stresses up to this size are rounding errors.
         given: load of analysis "load", by name.
     """

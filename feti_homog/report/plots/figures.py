@@ -56,7 +56,7 @@ def plot(
 def draw(
     directory: Path, document: Document, share: slice, look: plot_helpers.Look = plot_helpers.PLAIN, state: Any = None
 ) -> list[Path]:
-    """Draw a `share` of the pictures of a result, so that every rank can draw others; see `plot`."""
+    """Draw a `share` of the pictures of a result, so that ranks can draw different ones; see `plot`."""
     pictures, paths = list[Picture](), list[Path]()
     try:
         with mpl.rc_context(look.style), ExitStack() as stack:

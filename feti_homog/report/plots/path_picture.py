@@ -96,10 +96,10 @@ def _axis_label(axis: str) -> str:
 
 
 def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, Any]) -> bool:
-    """Draw the stresses of a path, or the strains if no stress acts, over `axis`; return whether it has stresses.
+    """Draw the stresses of a path, or the strains if no stress acts, over `axis`; return whether stresses act.
 
     Thin lines show the first leg with its snap-back; thick lines show the response to a controlled load, on all legs.
-    On later legs lines end at a break if the state behind it is unknown.
+    On later legs lines end at a break if the state after the break is unknown.
     """
     points, first = document["path"], path_curves.first_leg(document)
     table, names = path_curves.table_of(points), path_curves.shown_components(document)
@@ -139,7 +139,7 @@ def _line_style(values: Array, drawn: list[Array]) -> str:
 
 
 def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[str, Any]) -> None:
-    """Draw counts of bonded, open and closed nodes.  Lines are thin at all equilibria, thick at a rising load."""
+    """Draw counts of bonded, open and closed nodes: thin lines at all equilibria, thick lines at a rising load."""
     points, drawn = document["path"], list[Array]()
     rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
     # The bonds of an event break at the event, the bonds of an increment on the way to it.
@@ -229,10 +229,10 @@ def energies(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
 def energy_curves(document: Document, points: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
     """Return `ENERGIES`, load factor and axis (n,) at drawn positions along `points`, from the unloaded cell on.
 
-    Energies are quadratic along the straight way to a point ('), which is a ray through zero on the first leg.  The
-    break before this way loses energy at one load; its work is 0 or, under given stresses alone, twice the loss.  The
-    slope of the work at an end is S dE + C dT or, under given stresses, dS E'.  Twice the stored energy, S E + C T,
-    gives the conjugate C of the temperature T.
+    Up to each point the load moves straight, on the first leg along a ray through zero, and energies are quadratic.
+    With stress S, strain E, temperature T and their changes d, the slope of the work at an end is S dE + C dT or, under
+    given stresses, E dS; the conjugate C of T follows from the stored energy (S E + C T) / 2.  A break at the start of
+    the way loses energy at one load; its work is 0 or, under given stresses alone, twice the loss.
     """
     path, legs, axis = document["case"]["path"], path_curves.legs(document), path_curves.abscissa(document)[0]
     table = {name: np.append(0.0, values) for name, values in path_curves.table_of(points).items()}

@@ -89,7 +89,7 @@ PLAIN = Look()
 def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
     """Write the figure in the format of `look`; return the file path.
 
-    By default pictures have no white margins.  Raises FetiHomogError if the file cannot be written.
+    Pictures without a chosen size have no margins.  Raises FetiHomogError if the file cannot be written.
     """
     if look.title is not None:
         set_title: Any = figure.suptitle if figure.get_suptitle() else figure.axes[0].set_title
@@ -134,7 +134,7 @@ def faint_grid(axes: Axes) -> None:
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: Any) -> Any:
-    """Draw triangles in smooth colours by nodal values (p,) at `points` (p, 2).  Returns the triangles."""
+    """Draw triangles in smooth colours by nodal values (p,) at `points` (p, 2).  Returns the drawn mesh."""
     mesh = add_triangles(axes, points, drawn.triangles)
     mesh.set(array=values, norm=norm, cmap=colours)
     return mesh
@@ -233,7 +233,7 @@ def magnification(displacement: float, size: float, opening: float = 0.0, larges
 
 
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
-    """Return the chosen stress, else the stress conjugate to the largest strain of the states.
+    """Return `chosen` or, for "auto", the stress conjugate to the largest strain of the states.
 
     Only strains with a macroscopic stress count, or all if no stress acts.
     """

@@ -121,7 +121,7 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Choose axis limits around zero and the loads (n, 2) near the median.  Returns notes on hidden loads, or []."""
+    """Set axis limits around zero and the loads (n, 2) of usual size.  Returns notes on loads outside, or []."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
     far = size > 6.0 * usual  # directions that hardly open a bond

@@ -31,7 +31,7 @@ NAMES = {
 
 
 def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw tractions, jumps and damage of some fibres in rows: the most damaged, or else the most loaded fibre."""
+    """Draw tractions, jumps and damage, a row per fibre: up to four most damaged fibres, or else the most loaded."""
     file, names = cell.file, _chosen_states(cell.file, document)
     fibre, last_state = file["interface/fibre"][:], file[f"state/{names[-1]}"]
     status = last_state["status"][:]
@@ -105,7 +105,7 @@ def _chosen_states(file: Any, document: Document) -> list[str]:
     """Choose the states to draw; return their names in result.h5.
 
     A path gives the state at the peak (or the first), and the state in the valley after the peak (or the last with
-    tractions).  Other analyses give the first partly debonded state, or the last with tractions; angles the middle one.
+    tractions).  Other analyses give the first (angles: the middle) partly debonded state, or the last with tractions.
     """
     names, total = sorted(file["state"], key=int), len(file["interface/points"])
     status = {name: file[f"state/{name}/status"][:] for name in names}
@@ -225,5 +225,5 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """Shorten vectors (..., 2) by whole periods."""
+    """Shift vectors (..., 2) by whole periods, to components of at most half a period."""
     return np.asarray(vectors - period * np.round(vectors / period))

@@ -77,8 +77,8 @@ def _errors(document: Document) -> Document:
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
     """Return a table of constants and, unless `errors` is empty, of mesh errors, `abreast` per line.
 
-    Errors have two digits, and constants as many decimals as their errors.  Without an error, constants have seven
-    digits; ratios in tables with `PAIRS` per line have six decimals.
+    Errors have two digits, and constants as many decimals as their errors.  Without a visible error, constants have
+    seven digits; ratios in tables with `PAIRS` per line have six decimals.
     """
     rows, count = [], 3 if errors else 2  # the third column has the errors
     for name, value in values.items():
@@ -122,7 +122,7 @@ def thermal(document: Document) -> list[Table]:
 
 
 def moduli(document: Document) -> Table:
-    """Return a table of the moduli in the plane.  Text has moduli at the left, ratios at the right."""
+    """Return a table of the moduli in the plane, in text two per line: moduli at the left, ratios at the right."""
     values, errors = document["moduli"], _errors(document).get("constants", {})
     sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
     names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
@@ -183,7 +183,7 @@ def cell_constants(document: Document) -> list[Table]:
 
 
 def ranges_across(document: Document) -> str:
-    """Return the ranges of E and G over all directions across the fibres, or ""."""
+    """Return, as text, the ranges of Young's (E) and shear modulus (G) over directions across the fibres, or ""."""
     across = document.get("transverse_moduli") or {}
     ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
     return ", ".join(ranges) if across else ""
@@ -222,7 +222,7 @@ def constants(document: Document) -> dict[str, float]:
 
 
 def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
-    """Rename constants from cell axes to material axes.  Normal expansions keep their names; others are left out."""
+    """Rename constants from cell axes to material axes.  Normal expansions keep their names; others are dropped."""
     places = {name: engineering_constants.OF_THE_CELL[name] for name in ENGINEERING}
     places |= {name: name for name in engineering_constants.MATERIAL_EXPANSIONS[:3]}
     return {name: numbers[constant] for name, constant in places.items() if constant in numbers}
@@ -272,7 +272,7 @@ def mesh_errors(document: Document) -> dict[str, float]:
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Select constants for tables: SHOWN_* or, of loads and secants in space, the first MOST, off-diagonals last."""
+    """Select names for tables: of SHOWN_* if E1 or k11 is among them, else MOST at most, off-diagonal entries last."""
     if {"E1", "k11"} & {*names}:
         return [name for name in (SHOWN_IN_SPACE if "E3" in names else SHOWN_IN_PLANE) if name in names]
     return sorted(names, key=lambda name: name.startswith("C") and name[1] != name[2])[:MOST]

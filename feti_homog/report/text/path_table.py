@@ -92,7 +92,7 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
 
 
 def _landmark(document: Document, peak: Document, title: str) -> str:
-    """Describe a landmark by its stress, if any, its strain or temperature, event or increment, fibre and direction."""
+    """Describe the landmark whose keys in `peak` begin with `title`: stress if any, load, event or increment, bond."""
     event, stress = peak[f"{title}event"], without_noise(peak[f"{title}stress"])
     place = f"{document['case']['path']['method'].removesuffix('s')} {event}"
     of_stress = f"{stress:.6g} " if stress or path_curves.temperature_of(document, event) is None else ""

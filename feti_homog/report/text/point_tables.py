@@ -41,7 +41,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def angle_table(document: Document, limit: int | None = None) -> Table:
-    """Tabulate stresses or stiffnesses at up to `limit` angles (None: all), with node counts unless (6, 6)."""
+    """Return a table of stresses or stiffnesses at up to `limit` angles (None: all); plane states have node counts."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -98,7 +98,7 @@ def debonded(document: Document, point: Point) -> list[str]:
 
 
 def envelope_table(document: Document, limit: int | None = None) -> Table:
-    """Return the table of onset loads and first breaks in at most `limit`, or `ENVELOPE_ROWS`, directions."""
+    """Return the table of onset loads and first breaks in at most `limit` directions, by default `ENVELOPE_ROWS`."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, temperature = section["plane"], section.get("temperature")
     unit = stress_label(document) if axes[0].startswith("S") else ""
@@ -142,7 +142,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return [table of the largest G by angle and load]; [] without tips.  A single load's table has all rates."""
+    """Return a list of one table, the largest G by angle and load (for one load, all its rates); [] without tips."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
@@ -175,4 +175,4 @@ TABLES: dict[str, Callable[[Document, int | None], list[Table]]] = {
     "load": lambda document, limit: [load_table(document)],
     "envelope": lambda document, limit: [envelope_table(document, limit)],
 }
-"""Tables of an analysis, with at most `limit` rows of points; None for the rows of the summary."""
+"""Functions that return tables by analysis, with at most `limit` rows of points (None: as in the summary)."""

@@ -56,7 +56,7 @@ def _dash(value: float | None) -> float | str:
 
 
 def scatter_text(document: Document) -> str:
-    """Return the table of results with scatter and input contributions.  Remarks name noisy slopes."""
+    """Return a table of results with their scatter and the share of each input, as text.  Remarks name noisy slopes."""
     inputs, heads = document["parameters"], {"value": "value", "+- inputs": "std_inputs"}
     if document["cells"] > 1:
         heads |= {"+- cells": "std_cells", "+- both": "std"}

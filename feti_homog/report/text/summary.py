@@ -258,7 +258,7 @@ def phase_tables(document: Document) -> list[Table]:
 
 
 def _stress_error(document: Document) -> list[str]:
-    """Return a note with the mean relative error of stresses, the root of the largest relative energy error, or []."""
+    """Return a note on the relative error of stresses, estimated from the energies, in a list; [] without errors."""
     points = [document.get("load", {}), *document.get("path", ()), *document.get("angle", ())]
     energies = [point.get("mesh_error") for point in points] + [(document.get("mesh_error") or {}).get("energy")]
     error = without_noise(max(energy or 0.0 for energy in energies) ** 0.5)
@@ -267,7 +267,7 @@ def _stress_error(document: Document) -> list[str]:
 
 
 def _states(document: Document, count: int) -> Sequence[int]:
-    """Return the numbers of the states in the tables of phase stresses."""
+    """Return indices below `count` of the states in tables of phase stresses, of a curve at most POINTS points."""
     if "path" in document and "states" in document:
         from feti_homog.results import landmarks  # only paths have landmarks
 
@@ -278,6 +278,6 @@ def _states(document: Document, count: int) -> Sequence[int]:
 
 
 def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return the k-th value of a quantity without noise, and its position "x, y"; "-" for the value zero."""
+    """Return the k-th value of a quantity without noise, and its position "x, y", or "-" if the value is zero."""
     value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
     return value, f"{x:.3g}, {y:.3g}" if value else "-"

@@ -43,7 +43,7 @@ def in_brackets(unit: str) -> str:
 
 
 def with_micro(unit: str) -> str:
-    """Write "um" in a unit with the micro sign."""
+    """Replace the letter u of "um" in a unit by the micro sign."""
     return re.sub(r"\bum(?![A-Za-z])", "\N{MICRO SIGN}m", unit)
 
 
@@ -53,7 +53,7 @@ def stress_label(document: Document) -> str:
 
 
 def toughness_label(document: Document) -> str:
-    """Return the unit of energy release rates, in brackets.  It is empty unless the case labels both units."""
+    """Return the unit of energy release rates, in brackets; empty unless the case labels stresses and lengths."""
     output = document["case"].get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     return in_brackets(f"{stress} {length}") if stress and length else ""

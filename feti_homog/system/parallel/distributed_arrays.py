@@ -127,7 +127,7 @@ def scale_rows(weights: Float, x: Float) -> Float:
 
 
 def balanced(load: AnyInt, n_ranks: int) -> Int:
-    """Assign loads (n,) to ranks (n,): in descending order, each to the rank with the least load."""
+    """Return a rank for each of the loads (n,): in descending order, each goes to the rank with the least total."""
     ranks = np.zeros(len(load), np.int64)
     heap = [(0, rank) for rank in range(n_ranks)]
     for k in np.argsort(-load, kind="stable"):

@@ -48,14 +48,14 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Call a function on every rank, and return its result; if a rank raises, every rank raises.  Collective.
 
-    `function` must not communicate.  A MemoryError becomes NoMemoryError, an OSError with a file name FetiHomogError.
+    `function` must not communicate.  MemoryError becomes NoMemoryError, and OSError with a file name FetiHomogError.
     A rank raises its own defect; other ranks raise RemoteError for the first defect, else the first FetiHomogError.
     """
     return _agreed(comm, *_attempt(function, *args, **kwargs))
 
 
 def _agreed(comm: Comm, result: T | None, error: Exception | None) -> T:
-    """Return the result, or raise like `agree`.  Collective."""
+    """Return the result of this rank or, if any rank has an error, raise like `agree`.  Collective."""
     messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
     if messages:
         if error is not None and not isinstance(error, FetiHomogError | MemoryError):
@@ -88,7 +88,7 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """Call main() on every rank, and return its exit code.  Collective.
 
-    If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints it, and its exit code is returned.
+    If every rank raises a FetiHomogError within ARRIVAL_TIMEOUT_S, rank 0 prints its own; the exit code is returned.
     After any other exception, or a FetiHomogError only on some ranks, the rank prints it and aborts the job.
     """
     try:
@@ -104,7 +104,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
-    """Print the exception of this rank, and abort the processes of all ranks with its exit code; never returns."""
+    """Print an exception of this rank, and abort the processes of all ranks with the exception's exit code."""
     reported = _without_memory(comm, error) if isinstance(error, MemoryError) else error
     if isinstance(reported, FetiHomogError):
         code, lines = reported.exit_code, _lines(reported)
@@ -148,7 +148,7 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _lines(error: FetiHomogError) -> str:
-    """Return the faults as lines that begin with "error: "."""
+    """Return the faults of an error as lines that begin with "error: "."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 

@@ -19,7 +19,7 @@ H5PY = "install the Debian packages python3-h5py and python3-h5py-mpi, or load y
 
 
 def require() -> None:
-    """Import mpi4py, petsc4py and h5py, which starts MPI but not PETSc.
+    """Import mpi4py, petsc4py and h5py; this starts MPI but not PETSc.
 
     Raises:
         LibraryError: a library is missing, broken or without MPI; one line for every library, with the remedy.
@@ -87,7 +87,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
     """Return the advice for a missing petsc4py.
 
-    Debian has petsc4py in a folder of `debian` that PETSC_DIR names; `path` is Python's search path.
+    Debian has petsc4py in a folder below `debian`, which PETSC_DIR must name; `path` is Python's search path.
     """
     folders = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
     if not folders:

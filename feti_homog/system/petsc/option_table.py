@@ -17,7 +17,7 @@ class Option:
 
 
 def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[Option, Option]:
-    """Return the options of a direct solver by its prefix; `matrix` names its matrix in the help."""
+    """Return the options of the direct solver with a prefix; `matrix` describes its matrix in their help texts."""
     return (
         Option(f"{prefix}pc_type", "cholesky|lu", "cholesky", f"factorization of {matrix}"),
         Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", library, f"library of {matrix}"),
@@ -25,7 +25,7 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """Return the options of a coarse solver by its prefix; `matrix` names its distributed matrix in the help."""
+    """Return the options of the coarse solver with a prefix; `matrix` describes its matrix in their help texts."""
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
@@ -124,7 +124,7 @@ def only_prints(name: str) -> bool:
 
 
 def almost_in_table(name: str) -> bool:
-    """Return whether a name is probably a misspelt option of the table with the same prefix."""
+    """Return whether an unknown option (name without dash) closely resembles a name in TABLE with its solver prefix."""
     prefix = solver_prefix(name)
     table = [option for option in TABLE if solver_prefix(option) == prefix]
     return bool(prefix and name not in TABLE and difflib.get_close_matches(name, table, 1, CLOSE))
@@ -137,7 +137,7 @@ def suggestion(name: str) -> str:
 
 
 def solver_prefix(name: str) -> str:
-    """Return the longest prefix in PREFIXES with which a name begins, else an empty string."""
+    """Return the longest prefix in PREFIXES with which a longer name begins, else an empty string."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 

@@ -76,7 +76,7 @@ def is_flag(name: str) -> bool:
 
 
 def is_viewer(name: str) -> bool:
-    """Return whether a flag (name without dash) prints, so that its value may be a viewer."""
+    """Return whether an option (name without dash) is a flag whose value may be a PETSc viewer, such as ascii:FILE."""
     return name in ("log_view", "options_view") or (name.startswith("feti_ksp_") and SHOWING.search(name) is not None)
 
 
@@ -119,7 +119,7 @@ def _is_place(text: str) -> bool:
 
 
 def _words_of(file: str) -> list[str]:
-    """Return the words of an options file; [] unless it is readable and contains only PETSc's options."""
+    """Return the words of an options file; [] if unreadable, or if it has other words or names another options file."""
     try:
         lines = input_files.read(Path(file), 1 << 20).decode("utf-8", "replace").splitlines()
     except (OSError, ValueError):  # ValueError: the name has a null character
@@ -210,7 +210,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 def petsc_words(options: Mapping[str, str]) -> list[str]:
     """Return the words with which PETSc starts, from options by name without dash.
 
-    Flags that PETSc reads itself are set or left out.  False flags of the solver stay: they override the case.
+    A true flag of PETSc itself has no value, a false one is left out.  False solver flags stay, to override the case.
     """
     argv = []
     for name, text in options.items():

@@ -65,7 +65,7 @@ def choices(prefix: str) -> dict[str, str]:
 
 
 def without_iterations() -> str:
-    """Return a remark for runs without iterations on options that print iterations; "" without such options."""
+    """Return a remark on the set options that print iterations, for a run that has none; "" without such options."""
     printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and table.only_prints(name)]
     return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
 

@@ -1,4 +1,4 @@
-"""The process: memory, progress, file locks, signals, standard streams; records for documents.
+"""The process: memory, progress, file locks, signals, standard streams; descriptions of record fields.
 
 Imports nothing.  Main entries: `standard_streams.Progress`, `file_locks`, `input_files`.
 """

@@ -109,7 +109,7 @@ class Lock:
 
 
 def _is_taken(file: int, kind: int) -> bool:
-    """Lock an open file with flock's `kind`; return False if another process has the lock, else raise OSError."""
+    """Lock an open file with flock's `kind`; return True, or False if another process has the lock.  Raises OSError."""
     try:
         fcntl.flock(file, kind | fcntl.LOCK_NB)
     except OSError as error:
@@ -120,7 +120,7 @@ def _is_taken(file: int, kind: int) -> bool:
 
 
 def holder(path: Path) -> str | None:
-    """Return the name (see `this_process`) of the process with the exclusive lock; None without lock or access."""
+    """Return the `this_process` name of the holder of an exclusive lock on `path`; None without a lock or access."""
     with contextlib.suppress(OSError), path.open("rb+") as stream:
         return None if _is_taken(stream.fileno(), fcntl.LOCK_SH) else _written(stream.fileno())
     return None
@@ -138,18 +138,18 @@ def _written(file: int) -> str:
 
 
 def tag() -> str:
-    """Return a name for files of this process that no other process ever has."""
+    """Return a name for the files of this process, unique over all machines and all time."""
     return f"{socket.gethostname()}.{os.getpid()}.{_began(os.getpid())}"
 
 
 def has_ended(name: str) -> bool:
-    """Return whether the process that made a `tag` has ended; False for other machines and other names."""
+    """Return whether `name` is the `tag` of an ended process on this machine; False for other machines and names."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 
 
 def remove_files() -> None:
-    """Remove the `files` of this process before it ends."""
+    """Remove the lock files and unfinished files of this process, the `files`; failures are ignored."""
     for path in tuple(files):
         with contextlib.suppress(OSError):
             path.unlink()

@@ -89,7 +89,7 @@ def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
 
 
 def prefer_own_toolkits() -> None:
-    """Let Python search `mpl_toolkits` first beside its `matplotlib`, without importing Matplotlib.
+    """Make Python import `mpl_toolkits` first from the folder of its Matplotlib, without importing Matplotlib.
 
     In an environment with --system-site-packages, Debian's matplotlib-nspkg.pth binds `mpl_toolkits` to Debian's folder
     at the start of Python.  A Matplotlib in the environment cannot import its 3-D axes from there, and would warn.

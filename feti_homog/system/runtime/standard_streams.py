@@ -63,7 +63,7 @@ def launched_rank() -> int:
 
 
 def prepare() -> None:
-    """Make output streams escape characters that the locale lacks; replace closed ones by os.devnull.  Call first."""
+    """Let stdout and stderr escape unencodable characters, and send closed streams to os.devnull.  Call this first."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
@@ -132,9 +132,9 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Context manager: time a block as a stage of the run and of PETSc's log; print its time unless it raises.
+        """Context manager: time a block as a stage of the run and of PETSc's log, and print the time on success.
 
-        The block may append remarks to the yielded list, which are printed with the time.  Inner stages do not count.
+        The time excludes inner stages.  The block may append remarks to the yielded list; they follow the time.
         """
         from petsc4py import PETSc
 
