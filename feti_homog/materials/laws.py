@@ -67,10 +67,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3): q = -k grad T in cell axes.  ValueError unless k is given, symmetric and positive definite.
-
-    A tensor of an orthotropic material is turned from the material axes.
-    """
+    """Return k (3, 3) in cell axes, q = -k grad T.  ValueError unless k is given, symmetric and positive definite."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')

@@ -117,8 +117,7 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
             unit[[i, j], [j, i]] = 1.0
             yield f"conductivity.k{i + 1}{j + 1}", float(tensor[i, j] + tensor[j, i]) / 2, R @ unit @ R.T
         if isinstance(material, material_forms.Orthotropic):
-            turn = np.zeros((3, 3))
-            turn[:2, :2] = TURN[3:5, 3:5]
+            turn = np.pad(TURN[3:5, 3:5], (0, 1))
             yield "angle", angle, turn @ conductivity(material) - conductivity(material) @ turn
 
 

@@ -122,21 +122,19 @@ def bond_of(peak: path_curves.Document, title: str = "") -> str:
     return f"fibre {peak[f'{title}fibre']} at {round(peak[f'{title}angle'], 3) + 0.0:.4g} degrees"
 
 
-def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the larger relative fall of the stress after the peak: to the valley or leg end.  It is at least 0."""
-    if "event" not in peak:
-        return 0.0
-    leg = path_curves.legs_of(document)
-    last = path_curves.table_of(document["path"])[peak["stress_name"]][leg == leg[peak["event"]]][-1]
-    remaining = (last, peak.get("stress_left", peak["stress"]))
-    return max(1.0 - stress / peak["stress"] for stress in remaining) if peak["stress"] else 0.0
-
-
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Name the largest stress: SO_FAR if `peak` has an entry `so_far`, PEAK before a fall, else LARGEST."""
+    """Name the largest stress: SO_FAR if `peak` has an entry `so_far`, PEAK before a fall, else LARGEST.
+
+    A fall takes at least `LEAST_FALL` of the stress, to the valley or to the end of the leg.
+    """
     if "so_far" in peak:
         return SO_FAR
-    return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
+    if not peak.get("stress"):
+        return LARGEST
+    leg = path_curves.legs_of(document)
+    last = path_curves.table_of(document["path"])[peak["stress_name"]][leg == leg[peak["event"]]][-1]
+    fall = max(1.0 - stress / peak["stress"] for stress in (last, peak.get("stress_left", last)))
+    return LARGEST if fall < LEAST_FALL else PEAK
 
 
 def passed_strengths(document: path_curves.Document, peak: path_curves.Document, numbers: Sequence[int]) -> list[str]:
