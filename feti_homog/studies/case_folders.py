@@ -35,8 +35,8 @@ INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 class Status(StrEnum):
     """The progress of a case.
 
-    An UNCONVERGED case has a result that its checks refuse, a FAILED case an error instead of a result.  The result of
-    a DAMAGED case is unreadable or belongs to another case.  An INTERRUPTED case has events, a WAITING case nothing.
+    An UNCONVERGED case has a result that its checks refuse, a FAILED case only an error.  The result of a DAMAGED case
+    is unreadable or of another case.  A RUNNING case is locked, an INTERRUPTED case has events, a WAITING case nothing.
     """
 
     DONE = "done"
@@ -59,7 +59,7 @@ WITHOUT_RESULT = (Status.UNCONVERGED, Status.FAILED, Status.DAMAGED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason, and the content of result.json or an unfinished path."""
+    """The status of a case, the reason for a missing or partial result, and its document, finished or not, or None."""
 
     status: Status
     reason: str = ""
@@ -68,7 +68,7 @@ class CaseState:
 
 @dataclass(frozen=True)
 class SweepIndex:
-    """The content of sweep.json: the list of all cases."""
+    """The content of sweep.json: name and stress unit of the sweep, and the list of all cases."""
 
     name: str
     stress_unit: str
@@ -78,8 +78,8 @@ class SweepIndex:
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
     """Refuse a folder that holds another study, or foreign files.  On one rank.
 
-    Raises CaseError for a study's document, and for a non-empty file or subfolder with a name in `entries`; OSError if
-    the folder cannot be read.  `kind` names the new study in the message.
+    Raises CaseError for the document of a study, and for a non-empty file or subfolder with a name that matches
+    `entries`; OSError if the folder cannot be read.  `kind` names the new study in the message.
     """
     for path in sorted(directory.iterdir()):
         if path.name in output_folder.STUDIES:
@@ -108,7 +108,7 @@ def document_lock(directory: Path) -> Iterator[None]:
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the sweep folder, or extend its case list.  On one rank.
+    """Make the sweep folder with the list of its cases, or append new cases to a stored list.  On one rank.
 
     Raises:
         CaseError: the folder cannot be made, has another sweep or foreign files, or its list is unreadable or locked.
@@ -152,7 +152,7 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """Read the case list in the sweep folder.  Raises CaseError for an unreadable list."""
+    """Read sweep.json of a sweep folder.  Raises CaseError if it is missing, unreadable or damaged."""
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
@@ -172,7 +172,7 @@ def read_index(directory: Path) -> SweepIndex:
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:
-    """Replace `old` by `new` in nested tables and lists, since JSON has no infinite numbers."""
+    """Return nested tables and lists with `new` in place of `old`: JSON has no infinite numbers."""
     if isinstance(value, dict):
         return {key: _replaced(item, old, new) for key, item in value.items()}
     if isinstance(value, list):
@@ -181,7 +181,7 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case: RUNNING if it has no result and a process holds its lock.  On one rank."""
+    """Return the progress of a case from its files and lock; RUNNING only without a result.  On one rank."""
     state, folder = stored_state(directory, entry), directory / entry.folder
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
@@ -194,7 +194,7 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case from its files alone, for the lock holder.  On one rank."""
+    """Return the progress of a case by result.json and error.txt alone, without lock and events.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:
@@ -215,7 +215,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write case.toml of a case, without empty sections.  On one rank.
+    """Write case.toml of a case with its defaults, without empty sections.  On one rank.
 
     Raises FetiHomogError if the file cannot be written.
     """
@@ -226,7 +226,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a case to WAITING: remove error and events, set aside the result.  On one rank; raises like `set_aside`."""
+    """Prepare a case for another run: remove error.txt and events, and `set_aside` its result.  On one rank."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
@@ -235,9 +235,9 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Rename the result.json of a case to result.json.STATUS.  On one rank.
+    """Rename result.json of a case to result.json.STATUS, and remove the other result files.  On one rank.
 
-    Also removes the other result files.  Raises FetiHomogError if the folder cannot be written.
+    Raises FetiHomogError if the folder cannot be written.
     """
     folder = directory / entry.folder
     path = folder / result_json.NAME
@@ -248,13 +248,13 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
-    """Write error.txt of a failed case.  On one rank.  Raises FetiHomogError if the file cannot be written."""
+    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if it cannot."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Return lines with the inputs of failed cases and the reasons of failures; [] without cases."""
+    """Return printable lines with the inputs of failed cases and the reasons of the failures; [] without cases."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]
@@ -262,7 +262,7 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 
 def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
-    """Return warnings and remarks; lines that agree up to a colon become one, with the number of their cases."""
+    """Return the warnings and remarks of all results.  Lines that agree up to a colon become one, with their number."""
     cases: dict[tuple[str, str], list[str]] = {}
     for kind in ("warning", "remark"):
         for entry, state in zip(entries, states, strict=True):
