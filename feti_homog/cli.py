@@ -19,7 +19,7 @@ GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: 
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command on all ranks, or `verify` without MPI, and return the exit code."""
+    """Run a command on all ranks (`verify` without MPI), and return the exit code."""
     words = sys.argv[1:] if argv is None else list(argv)
     ours, _ = option_values.split_argv(words)
     if ours[:1] == ["verify"]:

@@ -19,14 +19,14 @@ class ExitCode(IntEnum):
 
 
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape unprintable characters except `allowed`.  A terminal would obey control characters of a file."""
+    """Replace unprintable characters, except `allowed`, by escapes: a terminal would obey control characters."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
 class FetiHomogError(Exception):
-    """An error printed for the user, one line per fault, without a traceback.
+    """An error printed for the user without a traceback, with a line for each of its `faults`.
 
-    Long lines keep LONGEST_LINE characters, among them the last KEPT_END; a line counts the faults after MOST_FAULTS.
+    A line keeps at most LONGEST_LINE characters, with its last KEPT_END; after MOST_FAULTS lines one counts the rest.
     """
 
     exit_code = ExitCode.DEFECT
@@ -58,17 +58,17 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge or a check failed.  The computed part is written as `not converged`."""
+    """A solve did not converge, a check failed, or nothing carries the load.  A result that exists is marked so."""
 
     exit_code = ExitCode.UNCONVERGED
 
 
 class NotCarriedError(ConvergenceError):
-    """Nothing in the cell carries the prescribed load."""
+    """Nothing in the cell carries the prescribed stresses."""
 
 
 class NoMemoryError(FetiHomogError):
-    """A rank has no memory left, and all ranks know it."""
+    """A rank has no memory left; raised on all ranks."""
 
 
 class LibraryError(FetiHomogError):
