@@ -246,7 +246,7 @@ def _started(comm: Intracomm | None, *arguments: object) -> Iterator[Intracomm]:
 
 
 def _digest(arguments: tuple[object, ...]) -> str:
-    """Digest the arguments of a call: cases, documents, file names, numbers.  Raises CaseError if too long."""
+    """Digest the arguments of a call: cases, documents, file names, numbers.  Raises like `to_document`."""
     plain = [
         value.resolved() if isinstance(value, Case)
         else toml_files.to_document(value) if isinstance(value, Mapping)

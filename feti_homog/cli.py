@@ -1,4 +1,4 @@
-"""The command line, `feti-homog COMMAND ...`.
+"""Run the command line, `feti-homog COMMAND ...`.
 
 Options with a double dash belong to feti-homog, options with a single dash to PETSc.
 """

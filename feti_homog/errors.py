@@ -1,4 +1,4 @@
-"""The errors that the program prints for the user, and the exit codes."""
+"""Define the errors that the program prints for the user, and its exit codes."""
 
 import re
 from enum import IntEnum
@@ -58,7 +58,7 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge, a check failed, or nothing carries the load.  A result that exists is marked so."""
+    """A solve did not converge, a check failed, or nothing carries the load.  A written result is marked as such."""
 
     exit_code = ExitCode.UNCONVERGED
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CellInfo:
-    """The meshed cell."""
+    """The sizes, phase fractions and mesh of the cell."""
 
     width: float = described("width of the cell", records.LENGTH)
     height: float = described("height of the cell", records.LENGTH)
@@ -46,7 +46,7 @@ class CellInfo:
 
 @dataclass(frozen=True, kw_only=True)
 class FibreInfo:
-    """One fibre, with the number N of `fibre = N` in case files."""
+    """One fibre: its number N, as in `fibre = N` of case files, phase, shape and bond strength."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
     row: int | None = described("line in the fibre table, or position in `fibre_list`, from 1", default=None)
@@ -71,9 +71,9 @@ class FibreInfo:
 
     @classmethod
     def all_of(cls, case: Case, summary: domain_partition.CellSummary, factors: Float) -> tuple[FibreInfo, ...]:
-        """Return the records of all fibres of a torn cell, in the order of their numbers.
+        """Build the records of all fibres of a cell, in the order of their numbers.
 
-        `factors` (fibres,) are the strength factors; centres are shifted by the origin of the user's cell.
+        `factors` (fibres,) are the strength factors of their bonds.  Centres are in the user's coordinates.
         """
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
@@ -130,7 +130,7 @@ class SolverInfo:
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
-        """Sum sizes and solves over the problems of a cell; both lists have an entry for each state.  Collective."""
+        """Build the record of a cell; `iterations` and KSP `reasons` have an entry for each state.  Collective."""
         summary, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if summary.across else "bodies and pieces of bodies"
         uncut = "one subdomain, for nothing can part: one factor of the whole cell"

@@ -68,7 +68,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
 def _note_bounds(
     context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
 ) -> None:
-    """Note k across the fibres outside its bounds: Hashin-Shtrikman's if isotropic, else Wiener's (`note_outside`)."""
+    """Check k across the fibres against bounds by `note_outside`: Hashin-Shtrikman's if isotropic, else Wiener's."""
     least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
     error = np.asarray(errors[:2, :2].max())
     limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener

@@ -30,8 +30,8 @@ OFF = 3.0  # largest ratio of the true energy error to the estimate
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
     """Compute the `Result` entries that follow from stiffness and thermal stress in `secants`.  Collective.
 
-    Returns {} for a plane cell with interfaces, and for contact, where each stiffness column is a secant under another
-    load.  Cells with voids or debonded faces have no bounds and no estimates.
+    Returns {} for a plane cell with interfaces, and where faces touch: each stiffness column is then a secant under
+    another load.  Cells with voids or debonded faces have no bounds and no estimates.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -153,7 +153,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh suffices if the relative energy error `energy` on rank 0 exceeds `accuracy`.  Collective."""
+    """Note which mesh suffices if `energy`, the relative energy error on rank 0, is above `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None:
         return
@@ -258,7 +258,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Compute constants of a stiffness by name; for (6, 6) also nu31, nu32 and, with `heat`, expansions (6,)."""
+    """Compute constants of a stiffness by name: for (6, 6) also nu31, nu32 and, with `heat`, expansions (6,)."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {"thermal_expansion": entries.pop("thermal_expansion", None)}

@@ -61,7 +61,7 @@ class CellLoads:
     def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[averaging.Response]:
         """Return the responses to `scale` times an equilibrium, one for each problem.  Collective.
 
-        Arguments and errors are as in `Homogenization.response`.
+        `brief` and errors are as in `Homogenization.response`.
         """
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
@@ -218,7 +218,7 @@ class AnalysisContext:
 
     @cached_property
     def tip_zones(self) -> list[energy_release.TipZones]:
-        """The zones about tips of debonded arcs, in each problem.  Collective when first read."""
+        """The zones about tips of debonded arcs, for energy release rates, by problem.  Collective when first read."""
         from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
         return [energy_release.TipZones(problem.cell) for problem in self.loads.problems]
@@ -229,7 +229,7 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Build a point's entries on debonding, under gamma12 or the only load, and summed iterations.  Collective."""
+        """Build the entries of a point on debonding, under gamma12 or the only load, and on iterations.  Collective."""
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -254,7 +254,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List `notes`, and remarks on singular stresses, undetermined strains and strains above ABSURD."""
+        """List `notes`, and remarks on singular stresses, undetermined strains and absurdly large strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses beside {' and '.join(places)} rise without limit with finer elements")

@@ -84,7 +84,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], checkpoints.Arrays]) -> None:
-    """Write the event of point `number` to the checkpoint; prepare the remark of an interrupted run.  Collective."""
+    """Write the event of point `number` to the checkpoint; prepare the remark for an interruption.  Collective."""
     context.checkpoint.write(number, *event)
     if context.directory is not None:
         folder = context.directory

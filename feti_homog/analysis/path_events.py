@@ -141,7 +141,7 @@ def restored(event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfac
 
 
 def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:
-    """Restore the brief responses at a point, one for each problem, from its event.  Collective."""
+    """Restore the responses at a point, one for each problem, from its event, without fields.  Collective."""
     responses = list[averaging.Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
@@ -223,7 +223,7 @@ def consistent(context: AnalysisContext, count: int) -> int:
 def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective; raises like `read`.
 
-    A product F lambda with the dual operator F confirms a problem.  All events since every problem was last confirmed
+    Products F lambda with the dual operator F confirm a solution.  All events since every problem was last confirmed
     are completed and checked; a failed check or a wrong mean stress invalidates its event and all later events.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
@@ -265,7 +265,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
-    """Count this rank's bonds that part after `before`; -1 for arrays unlike `layout`, wrong numbers, healing bonds."""
+    """Count this rank's bonds that part after `before`; -1 for arrays unlike `layout`, wrong numbers or healing."""
     has_all = "lam" in event
     expected = {name: kind for name, kind in layout.items() if has_all or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != expected:

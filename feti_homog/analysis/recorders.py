@@ -112,7 +112,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record states, if `is_recording`: by label, a response or None for each problem.  Collective."""
+        """Record labelled states, each with a response or None for each problem, if `is_recording`.  Collective."""
         if not self.is_recording:
             return
         fields = recovered_fields.recover(self._cell, [*states.values()])
@@ -129,7 +129,7 @@ class StateRecorder:
                 self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
-        """Complete the file and return its seal.  Returns None without a file or after a write error.  Collective."""
+        """Complete result.h5 and return its seal; None without a file or after a write error.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 

@@ -1,7 +1,7 @@
 """Define the records of points, tips and mesh errors in result.json, which are fields of `result.Result`.
 
 Strains are [E11, E22, gamma12], in generalized plane strain [E11, E22, E33, gamma23, gamma13, gamma12].  Stresses are
-[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  They and energies per cell area have the unit of the moduli.
+[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  Stresses and energies per cell area have the unit of the moduli.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ DEBONDED_SHARES = "the same share for each [[interface]] section, in order; abse
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """The estimated mesh errors of a stiffness or conductivity, from recovered less element stresses."""
+    """The mesh errors of a stiffness or conductivity, estimated from recovered stresses minus element stresses."""
 
     effective_stiffness: Float | None = described("error of each entry", records.STRESS, EITHER_STIFFNESS, default=None)
     effective_stiffness_compression: Float | None = described(
@@ -71,7 +71,7 @@ class Tips:
 class TipRates:
     """The energy release rates at tips of debonded arcs, at constant macroscopic strain and temperature.
 
-    Only round fibres have rates.  The t rows, one for each load and tip, are sorted by load, fibre, interface,
+    Only round fibres have rates.  The t rows, each for a load and a tip, are sorted by load, fibre, interface and
     direction.
     """
 
@@ -190,8 +190,8 @@ class PathPoint:
 class Peak:
     """The largest stress on a path before the deepest fall of the stress, and landmarks before it.
 
-    The stress component is conjugate to the strain that is largest, among the strains that the load changes, on the leg
-    where damage begins under stress.  If only the temperature changes, it is the component with the largest stress.
+    The stress component is conjugate to the largest strain that changes on the leg where damage begins under stress.
+    If only the temperature changes, it is the component with the largest stress.
     """
 
     stress_name: str = described("name of the component")
@@ -255,7 +255,7 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """The debonding onset in one direction of a plane of stresses or strains; without an onset, `angle` alone."""
+    """The debonding onset in one direction of a plane of stresses or strains; only `angle` without an onset."""
 
     angle: float = described("direction of the load in the plane, from the first axis to the second", records.DEGREES)
     factor: float | None = described(

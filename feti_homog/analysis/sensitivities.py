@@ -1,4 +1,4 @@
-"""Differentiate a stiffness, its constants, a conductivity or a loaded state by the constants of the case."""
+"""Differentiate a stiffness, its constants, a conductivity or a loaded state with respect to case constants."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -42,7 +42,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:
     """Compute energy release rates at tips under each load but a unit temperature; no rows without tips.  Collective.
 
-    `responses` has, for a unit load, one in the problem with this load; for another load, one in each problem.
+    `responses` maps a unit load to its only response, and any other load to a response for each problem.
     """
     rates = list[tuple[energy_release.EnergyRelease, str]]()
     for load, parts in responses.items():

@@ -77,7 +77,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files in a folder whose final names match `names`, as far as possible.
+    """Remove unfinished files from a folder, as far as possible, if their final names match `names`.
 
     If `alone` is False, other processes may write there, and files of running writers stay.
     """

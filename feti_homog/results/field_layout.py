@@ -20,7 +20,7 @@ GROUP_OF_STATES = "state/K"
 
 @dataclass(frozen=True)
 class Header:
-    """The attributes of the file."""
+    """The attributes of result.h5: case, program version, cell, mesh and units."""
 
     title: str = described("name of the case")
     version: str = described("version of the program")
@@ -149,12 +149,12 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return descriptions of the fields of `part` with rows, which become datasets, by field name."""
+    """Return descriptions, by name, of the fields of `part` that have rows; they become datasets."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return values of the fields of `part` without rows, which become attributes, by attribute name."""
+    """Return the values, by attribute name, of the fields of `part` that have no rows; they become attributes."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 
@@ -205,7 +205,7 @@ class View:
     meaning: str
 
     def path(self, group: str) -> str:
-        """Return the path in the file of the view of `group`."""
+        """Return the path of the view in the file; `group` is the path of its datasets, such as state/0."""
         return f"{self.kind}/{group}/{self.name}"
 
 
@@ -216,7 +216,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _stress_tensor(axial: Sequence[str] = ()) -> View:
-    """Return the view of the stress tensor; without `axial`, names of shears along x3, these components are 0."""
+    """Return the view of the stress tensor; `axial` names shears along x3, which are 0 if it is empty."""
     entries: dict[str, tuple[str, int | None]] = {"33": ("stress_33", None)}
     entries |= {name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)}
     entries |= {name[1:]: ("axial_stress", column) for column, name in enumerate(axial)}

@@ -46,8 +46,8 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 def deepest_fall(size: Float, share: float | None, broken: Float) -> tuple[int, int | None]:
     """Return the numbers of the top and the valley of the deepest fall of a curve `size` (n,).
 
-    A fall counts if the number `broken` (n,) of bonds rises in it, and it begins at the largest value or takes the
-    fraction `share` (None: never) of its top.  Returns (n, None) if none exceeds `LEAST_DROP` of the largest value.
+    A fall counts if bonds break in it (their number `broken` (n,) rises), and it begins at the largest value or takes
+    the fraction `share` (None: never) of its top.  Returns (n, None) if none exceeds `LEAST_DROP` of the largest value.
     """
     top = np.maximum.accumulate(np.where(size >= np.maximum.accumulate(size), np.arange(len(size)), 0))
     fall = np.where(broken > broken[top], size[top] - size, 0.0)
@@ -123,7 +123,7 @@ def bond_of(peak: path_curves.Document, title: str = "") -> str:
 
 
 def fall_of(document: path_curves.Document, peak: path_curves.Document) -> float:
-    """Return the larger fall of the stress / peak stress: to the valley or the leg end; 0 without a peak or a fall."""
+    """Return the larger relative fall of the stress after the peak, to valley or leg end; 0 without a peak or fall."""
     if "event" not in peak:
         return 0.0
     leg = path_curves.legs_of(document)

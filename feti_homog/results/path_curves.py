@@ -173,7 +173,7 @@ def ends_of_legs(document: Document) -> list[int]:
 
 
 def is_proportional(document: Document) -> bool:
-    """Return whether every branch is a ray from zero: a path of events with one leg."""
+    """Return whether the response between breaks is always a ray from zero: on an event path with one leg."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 

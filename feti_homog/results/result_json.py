@@ -101,7 +101,7 @@ def _json_value(value: Any, place: str, faults: list[str]) -> Any:
 
 
 class DescribedColumn(NamedTuple):
-    """A column of a CSV file."""
+    """The name, unit and meaning of a column in a CSV file."""
 
     name: str
     unit: str
@@ -241,7 +241,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Check the size and checksum of a file; the seal was made with the same `block`.  Call on one rank.
+    """Check a file against its `expected` seal, made with the same `block`.  Call on one rank.
 
     Raises CaseError if size or checksum differ, FetiHomogError if the file cannot be read.
     """

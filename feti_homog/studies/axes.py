@@ -27,7 +27,7 @@ class Axis:
 
     @classmethod
     def of(cls, path: toml_files.TomlPath, value: Any) -> Self:
-        """Build the axis of the key at `path` from a list, or a table {from, to, ...}, without faults."""
+        """Build the axis of the key at `path` from a checked list or range {from, to, ...}."""
         if isinstance(value, list):
             return cls(path, tuple(value))
         low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")
@@ -47,7 +47,7 @@ class Axis:
 def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
     """Read the points and settings of a table [sweep].
 
-    A point is a value for every key that varies.  In a grid the last key in the file varies fastest; all sampled keys
+    A point maps each key that varies to a value.  In a grid the last key in the file varies fastest; all sampled keys
     together are the last axis.  Each fault adds a line to `faults`; a faulty table gives no points.
     """
     names = keys.keys_of(sections.SweepSection)

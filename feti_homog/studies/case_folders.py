@@ -59,7 +59,7 @@ WITHOUT_RESULT = (Status.UNCONVERGED, Status.FAILED, Status.DAMAGED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The status of a case, the reason for a missing or partial result, and its document, finished or not, or None."""
+    """The status of a case, the reason for a missing or partial result, and the document of this result or None."""
 
     status: Status
     reason: str = ""
@@ -226,7 +226,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Prepare a case for another run: remove error.txt and events, and `set_aside` its result.  On one rank."""
+    """Prepare a case for another run: remove error and events, `set_aside` its result.  On one rank; raises like it."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
@@ -262,7 +262,7 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 
 def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
-    """Return the warnings and remarks of all results.  Lines that agree up to a colon become one, with their number."""
+    """Return warnings and remarks of all results; lines that agree up to a colon become one, with a count of cases."""
     cases: dict[tuple[str, str], list[str]] = {}
     for kind in ("warning", "remark"):
         for entry, state in zip(entries, states, strict=True):

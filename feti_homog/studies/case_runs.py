@@ -22,7 +22,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep, with its status unless `directory` is None.  On one rank."""
+    """Return a line for each case of a sweep; with `directory` also status and progress.  On one rank."""
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
@@ -34,7 +34,7 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
 
 
 def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
-    """Return the number of ranks per case, by default all ranks.  Raises CaseError unless it divides their number."""
+    """Return the number of ranks per case, by default all.  Raises CaseError if groups of it do not divide `comm`."""
     size = comm.size if ranks_per_case is None else ranks_per_case
     if size < 1 or comm.size % size:
         raise CaseError(f"--ranks-per-case {size}: expected a divisor of the {comm.size} ranks")
@@ -116,7 +116,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make the sweep folder and lock it, `shared` or exclusively; CaseError if held.  Collective."""
+    """Context manager: make and lock the sweep folder, `shared` or not.  Raises CaseError if locked.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -258,7 +258,7 @@ def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
 def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
     """Describe the first case of a sweep below a heading.  Collective.
 
-    Returns text on rank 0, "" elsewhere.  Raises CaseError or MeshError for PETSc options or a first case with faults.
+    Returns text on rank 0, "" elsewhere.  Raises CaseError for faulty PETSc options, MeshError for a faulty cell.
     """
     check_options(sweep)
     text = description.describe(sweep.cases[0], comm)

@@ -54,7 +54,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return printed tables, as lines: means and scatter of each point with several realisations, values of others."""
+    """Tabulate constants or peaks as lines: mean and scatter at points with several realisations, values at others."""
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names

@@ -82,7 +82,7 @@ class ParameterEstimates:
 
     @property
     def half_width(self) -> Float:
-        """The half widths (n,) of the intervals with CONFIDENCE; inf for undetermined unknowns."""
+        """The half widths (n,) of the confidence intervals (level CONFIDENCE); inf for undetermined unknowns."""
         return np.asarray(norm.ppf((1 + CONFIDENCE) / 2) * self.std)
 
     @property
@@ -145,7 +145,7 @@ def estimate(
 
 
 def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:
-    """Minimize `squares` from `start` (n,) within bounds by a simplex (Nelder and Mead); `squares` keeps the points."""
+    """Minimize `squares` from `start` (n,) within bounds by Nelder and Mead's simplex.  `squares` records points."""
     size = _sizes(start)
     box = np.transpose(bounds) / size[:, None]
     options = {"maxfev": MOST_EVALUATIONS, "xatol": LEAST_CHANCE, "fatol": 1.0}

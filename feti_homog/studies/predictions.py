@@ -68,7 +68,7 @@ def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
 def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     """Yield the conflicts between a measured curve and the analysis of its test.
 
-    The curve's strain must rise along the leg: the largest prescribed strain, or the only loaded component's strain.
+    The curve must be over the rising strain of the leg: the largest prescribed or, under one stress, its conjugate.
     """
     state = voigt.PLANE_STATES[case.analysis.plane]
     names = {name for datum in points for name in (datum.strain_name, datum.name)}
@@ -102,7 +102,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
-    """Return, by name, the numbers in a result whose scatter a study reports.
+    """Return, by name, the numbers of a result for which a study reports scatter.
 
     They are constants of a stiffness, entries of a conductivity, onset and peak of a path, columns of other analyses.
     """
@@ -129,7 +129,7 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """Return the computed values (m,) at m data.  Raises CaseError if the result lacks a value, or a curve a strain."""
+    """Return the values (m,) computed for m data.  Raises CaseError if a value, or a strain of a curve, is missing."""
     values, ways = _values(document), {"onset": "; no bond breaks"}
     if "path" in document and "stress_left" not in landmarks.peak_of(document):
         values = {name: value for name, value in values.items() if not name.startswith("peak_")}
@@ -143,7 +143,7 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return the exact derivatives (m,) of computed values by the unknown `name`; None if unknown.
+    """Return exact derivatives (m,) of computed values by the unknown `name`; None if the result lacks them.
 
     Elastic constants do not depend on strengths, nor, in a plane, on expansions.  If all loads grow in proportion up to
     the onset, without a previous temperature, loads at breaks of a single interface are homogeneous: of degree 1 in the

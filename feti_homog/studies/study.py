@@ -117,7 +117,7 @@ class Study(ABC):
         Raises:
             CaseError: the folder holds another study or foreign files, another run writes to the folder, or a result
                 lacks a value that the study needs.
-            ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
+            ConvergenceError: a case failed; or the study has no sound answer, after its files are written.
             FetiHomogError: a file cannot be written.
         """
         size = case_runs.group_size(comm, ranks_per_case)

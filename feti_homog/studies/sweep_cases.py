@@ -23,10 +23,10 @@ class SweepCase:
 
     Attributes:
         number: number of the case, from 1.
-        point: number of the sweep point, from 1.  Its realisations have equal inputs, except seeds.
+        point: number of the sweep point, from 1.  Realisations of a point have equal inputs, except seeds.
         realisation: number of the realisation, from 1.
         inputs: values of the keys that vary, by dotted key.
-        identity: digest of the computation; empty before the case is checked.
+        identity: digest of case and PETSc options; empty before the case is checked.
     """
 
     number: int
@@ -105,7 +105,7 @@ def cases_at(
         complete: function that sets further keys in the document of a case, in place.
 
     Raises:
-        CaseError: points are faulty; or else cases are, named by their numbers, or their stress units differ.
+        CaseError: faults of points; without them, of cases, with their numbers; or stress units that differ.
     """
     lines = [*faults]
     unchecked = case_documents(document, points, realisations, lines, section)

@@ -44,7 +44,7 @@ class ScatterStudy(Study):
     realisations: int | None
 
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
-        """Return all realisations at points of the inputs, with keys `output` of [output] set.  Raises CaseError."""
+        """Return all realisations at points of the inputs; keywords set keys of [output].  Raises CaseError."""
         document = {**self.document, "output": self.document["output"] | output}
         return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
@@ -179,7 +179,7 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return data without values for the numbers in all results.  Raises CaseError if only some paths break or fall."""
+    """Name the numbers that all results have, as data without values.  CaseError if only some paths break or fall."""
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
@@ -194,6 +194,6 @@ def _data(documents: Documents) -> list[Datum]:
 
 
 def _values(documents: Documents, data: Sequence[Datum]) -> Float:
-    """Return the values (r, n) of n data in r results, which have all of them."""
+    """Return the values (r, n) of n data in each of r results."""
     named = [responses(document) for document in documents]
     return np.array([[values[datum.name] for datum in data] for values in named], float)
