@@ -1,7 +1,4 @@
-"""Run the command line, `feti-homog COMMAND ...`.
-
-Options with a double dash belong to feti-homog, options with a single dash to PETSc.
-"""
+"""Run the command line: options with a double dash belong to feti-homog, with a single dash to PETSc."""
 
 import argparse
 import importlib

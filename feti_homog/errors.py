@@ -58,7 +58,10 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge, a check failed, or nothing carries the load.  A written result is marked as such."""
+    """A solve did not converge, a check failed, or nothing carries the load.
+
+    A result that is written nevertheless has the status `not converged`.
+    """
 
     exit_code = ExitCode.UNCONVERGED
 

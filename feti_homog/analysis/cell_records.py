@@ -46,7 +46,7 @@ class CellInfo:
 
 @dataclass(frozen=True, kw_only=True)
 class FibreInfo:
-    """One fibre: its number N, as in `fibre = N` of case files, phase, shape and bond strength."""
+    """One fibre: number N (for `fibre = N` in case files), phase, shape and bond strength."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
     row: int | None = described("line in the fibre table, or position in `fibre_list`, from 1", default=None)
@@ -130,7 +130,10 @@ class SolverInfo:
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
-        """Build the record of a cell; `iterations` and KSP `reasons` have an entry for each state.  Collective."""
+        """Build the record of all problems of a cell, without `options`.  Collective.
+
+        `iterations` and `reasons` (KSPConvergedReason) have an entry for each state.
+        """
         summary, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if summary.across else "bodies and pieces of bodies"
         uncut = "one subdomain, for nothing can part: one factor of the whole cell"

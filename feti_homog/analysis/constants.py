@@ -51,10 +51,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Compute the constants of a stiffness, as `Result` entries.
-
-    The stiffness is (3, 3) or (6, 6); the thermal stress is (6,), or None without thermal expansion.
-    """
+    """Compute the `Result` entries of a stiffness, (3, 3) or (6, 6), and a thermal stress, (6,) or None."""
     if len(stiffness) == 3:
         return {"moduli": engineering_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -258,7 +255,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Compute constants of a stiffness by name: for (6, 6) also nu31, nu32 and, with `heat`, expansions (6,)."""
+    """Compute constants of a stiffness by name; (6, 6) adds nu31, nu32 and, with a thermal stress, expansions (6,)."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {"thermal_expansion": entries.pop("thermal_expansion", None)}

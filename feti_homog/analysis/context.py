@@ -59,10 +59,7 @@ class CellLoads:
         return [[next(rest) for _ in problem.loads] for problem in self.problems]
 
     def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[averaging.Response]:
-        """Return the responses to `scale` times an equilibrium, one for each problem.  Collective.
-
-        `brief` and errors are as in `Homogenization.response`.
-        """
+        """Return each problem's response to `scale` times an equilibrium (`Homogenization.response`).  Collective."""
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
@@ -87,7 +84,10 @@ class CellLoads:
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain` and `stress`, and `temperature` if it is a load; one response per problem."""
+        """Return macroscopic `strain` and `stress`, and `temperature` if it is a load, by name.
+
+        `responses` has one for each problem under the same load.
+        """
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -229,7 +229,10 @@ class AnalysisContext:
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Build the entries of a point on debonding, under gamma12 or the only load, and on iterations.  Collective."""
+        """Build the result.json entries of a point on debonding and iterations.  Collective.
+
+        Debonding is under gamma12 or, with a single load, under this load; iterations are summed over the responses.
+        """
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {

@@ -95,7 +95,7 @@ def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], ch
 def _record_checks(
     context: AnalysisContext, place: str, responses: Sequence[averaging.Response], is_first: bool
 ) -> None:
-    """Record and log the checks of responses at a point; print lines of the first point and of new faults."""
+    """Record and log the checks of responses at a point; print the line of the first point, and lines of new faults."""
     for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
         faults = len(context.checks.faults)
         line = context.checks.record(f"{place}{problem}", response)

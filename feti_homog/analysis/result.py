@@ -204,10 +204,7 @@ class Result:
         return {self.peak.strain_name: sign * curve[:, -1]} | stresses
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number such as E1 by its name in one of the records CONSTANTS.
-
-        Raises AttributeError, which names the record that has the attribute, or similar names.
-        """
+        """Return a number, such as E1, of a record in CONSTANTS.  Raises AttributeError with a hint for other names."""
         parts = {key: vars(part) for key, part in vars(self).items() if is_dataclass(part)}
         table = {key: value for record in CONSTANTS for key, value in parts.get(record, {}).items()}
         if name in table:

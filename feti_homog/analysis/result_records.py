@@ -31,7 +31,7 @@ DEBONDED_SHARES = "the same share for each [[interface]] section, in order; abse
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """The mesh errors of a stiffness or conductivity, estimated from recovered stresses minus element stresses."""
+    """The mesh errors of a stiffness or conductivity, estimated by the difference of recovered and element stresses."""
 
     effective_stiffness: Float | None = described("error of each entry", records.STRESS, EITHER_STIFFNESS, default=None)
     effective_stiffness_compression: Float | None = described(

@@ -75,7 +75,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
 
 
 def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
-    """Raise CaseError: `start`, then keys and ranks unlike the document `stored`, except in section `skipped`."""
+    """Raise CaseError with `start` and the keys or ranks that differ from the document `stored`, except `skipped`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
     ignored, n_before = ("name", "petsc", skipped), stored["solver"]["ranks"]

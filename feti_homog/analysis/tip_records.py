@@ -24,7 +24,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     """Return the bond law that decides on breaks along a path if `grows`, else on the first break.  Collective.
 
     With `growth = "released"`, released energies decide wherever tips may be: on a path, or at prescribed debonded
-    faces.  Raises CaseError if they need the inverse dual operator, which the solver does not have.
+    faces.  Raises CaseError if they need the inverse dual operator, which only `-feti_pc_type influence` has.
     """
     law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, energy.SpringEnergy) and cell.case.interfaces[0].growth == "released"):

@@ -30,7 +30,7 @@ def fibres(path: Path, pixel: float) -> tuple[Float, str]:
 
 
 def draw(path: Path, circles: Float, pixel: float, table: Path) -> str:
-    """Draw `circles` over the image `path` into TABLE_circles.png; return its path.  Raises CaseError if both agree."""
+    """Draw circles over an image into TABLE_circles.png; return its path.  Raises CaseError if `path` is this file."""
     from feti_homog.report.plots import plot_helpers  # with Matplotlib
 
     picture = table.with_name(f"{table.stem}_circles.png")

@@ -247,10 +247,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove its events, so that no run finds a part of them.  Call on one rank.
-
-    Raises FetiHomogError if the folder cannot be renamed.
-    """
+    """Remove the checkpoint, renamed before, so that no run finds a part.  On one rank.  Raises FetiHomogError."""
     folder, dropped = directory / FOLDER, directory / DROPPED
     _remove_events(dropped)
     if folder.is_dir():

@@ -27,7 +27,8 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Values at successive turning points or ends differ by more than `threshold`; without such changes there are none.
+    Values at successive turning points, which may be ends of the curve, differ by more than `threshold`.  A curve whose
+    values differ less has none.
     """
     entries, low, high = list[int](), 0, 0  # low, high: extremes since the last turning point
     rises = falls = True  # the curve may begin with either
@@ -182,6 +183,7 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
             marked points if they all fit, points around the deepest drops (up to half the rest), evenly spaced points.
         legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
+        marked: numbers of points at landmarks.
     """
     if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
         return list(range(len(points)))

@@ -59,7 +59,10 @@ WITHOUT_RESULT = (Status.UNCONVERGED, Status.FAILED, Status.DAMAGED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The status of a case, the reason for a missing or partial result, and the document of this result or None."""
+    """The progress of a case.
+
+    `reason` says why a result is missing or partial; `document` is result.json or an unfinished path, or None.
+    """
 
     status: Status
     reason: str = ""
@@ -181,7 +184,10 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case from its files and lock; RUNNING only without a result.  On one rank."""
+    """Return the progress of a case from its files and lock.  On one rank.
+
+    A case without a result is RUNNING if a process holds its lock.
+    """
     state, folder = stored_state(directory, entry), directory / entry.folder
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
@@ -215,10 +221,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write case.toml of a case with its defaults, without empty sections.  On one rank.
-
-    Raises FetiHomogError if the file cannot be written.
-    """
+    """Write case.toml with its defaults, without empty sections.  On one rank.  Raises FetiHomogError if it cannot."""
     document = {name: table for name, table in case.resolved().items() if table != {}}
     folder = directory / entry.folder
     atomic.remove_unfinished(folder, re.compile(rf"{CASE_FILE}|{ERROR_FILE}"))
@@ -226,7 +229,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Prepare a case for another run: remove error and events, `set_aside` its result.  On one rank; raises like it."""
+    """Remove error.txt and events of a case, and `set_aside` its result.  On one rank.  Raises FetiHomogError."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
@@ -235,10 +238,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Rename result.json of a case to result.json.STATUS, and remove the other result files.  On one rank.
-
-    Raises FetiHomogError if the folder cannot be written.
-    """
+    """Rename result.json to result.json.STATUS; remove other result files.  On one rank.  Raises FetiHomogError."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     with atomic.file_errors("write", folder):

@@ -34,7 +34,7 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
 
 
 def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
-    """Return the number of ranks per case, by default all.  Raises CaseError if groups of it do not divide `comm`."""
+    """Return the number of ranks per case, by default all.  Raises CaseError unless it divides the size of `comm`."""
     size = comm.size if ranks_per_case is None else ranks_per_case
     if size < 1 or comm.size % size:
         raise CaseError(f"--ranks-per-case {size}: expected a divisor of the {comm.size} ranks")
@@ -116,7 +116,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make and lock the sweep folder, `shared` or not.  Raises CaseError if locked.  Collective."""
+    """Context manager: make and lock the sweep folder.  Raises CaseError if another run holds it.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:

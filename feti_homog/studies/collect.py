@@ -54,7 +54,10 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Tabulate constants or peaks as lines: mean and scatter at points with several realisations, values at others."""
+    """Return the lines of printed tables of constants or peaks.
+
+    A point with several realisations has a table of means and scatter; all other points share a table of values.
+    """
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names

@@ -60,7 +60,7 @@ class Fit(Study):
         """Return a case for each pair of test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
-            """Set [output] of a document, in place, to numbers alone, with derivatives except for contact and paths."""
+            """Reduce [output] of a document, in place, to numbers, with derivatives of linear constants."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None
@@ -87,7 +87,7 @@ class Fit(Study):
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a remark on data of spatial tests with names that differ in ply axes; "" without such names."""
+        """Return a remark on names in the data that mean something else in ply axes; "" without such names."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -209,7 +209,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """Return the data (m,) computed at x (n,), stored by the first call.  On rank 0.  Raises if a case fails."""
+        """Return the data (m,) computed at unknowns x (n,), once for each x.  On rank 0.  Raises if a case fails."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
@@ -265,10 +265,7 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
-        """Run cases for pairs of test number and unknowns in the subfolder `name`.  Collective.
-
-        Returns pairs of result document and computed data on rank 0, [] elsewhere.
-        """
+        """Run cases in a subfolder; return pairs of result and computed data on rank 0, [] elsewhere.  Collective."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

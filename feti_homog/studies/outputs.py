@@ -110,7 +110,7 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """Return entries C11, C12, ... + `suffix` of a stiffness by name; {} if empty.  `numbers` label three rows."""
+    """Return entries C11, C12, ... + `suffix` of a stiffness by name; {} if empty.  `numbers` label (3, 3) rows."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 

@@ -51,7 +51,7 @@ def draw_over_fractions(directory: Path, table: SweepTable) -> list[Path]:
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """Choose the outputs to draw: moduli, else stresses at onset and, if all stresses fall, at the peak; () if none."""
+    """Choose the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak; () if none."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)

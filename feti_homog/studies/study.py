@@ -100,10 +100,7 @@ class Study(ABC):
         return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 
     def describe(self, comm: Intracomm) -> str:
-        """Describe the study and its first case.  Collective.
-
-        Returns text on rank 0, "" elsewhere.  Raises CaseError or MeshError if the first case is faulty.
-        """
+        """Describe study and first case on rank 0; "" elsewhere.  Collective.  Raises CaseError and MeshError."""
         heading = mpi_errors.on_root(comm, self.heading)
         return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)
 

@@ -179,7 +179,10 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Name the numbers that all results have, as data without values.  CaseError if only some paths break or fall."""
+    """Name the numbers that all results have, as data without values.
+
+    Of paths these are only loads and the components at the peak.  Raises CaseError if only some paths break or fall.
+    """
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
