@@ -247,7 +247,7 @@ def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> 
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Assemble errors of stiffness and thermal stress from the part `name` (one of PARTS); {} without errors."""
+    """Assemble the errors `name` (one of PARTS) of stiffness and thermal stress by `Result` entry; {} without any."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -267,7 +267,7 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 
 
 def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
-    """Return the largest relative strain energy error under any strain.  `parts` has `_secants` for each of PARTS.
+    """Return the largest relative strain energy error under any strain.  `parts` maps each of PARTS to `_secants`.
 
     If the stiffness is not positive definite, returns the largest relative error under a unit strain.
     """

@@ -66,7 +66,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
     Raises:
         CaseError, MeshError: the case cannot be run.
-        ConvergenceError: a solve did not converge or a check failed; the summary is printed before, unless `quiet`.
+        ConvergenceError: no convergence or a failed check, after a summary unless `quiet`; or nothing carries the load.
     """
     progress = standard_streams.Progress(comm, quiet)
     with _torn(case, comm, progress) as cell:

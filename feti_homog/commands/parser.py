@@ -50,7 +50,7 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A command-line parser that raises CaseError instead of leaving the process, so that the exit code is 2."""
+    """A command-line parser that raises CaseError for faulty arguments."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")

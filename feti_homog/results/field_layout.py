@@ -159,7 +159,7 @@ def attributes(part: Any) -> dict[str, Any]:
 
 
 def rows_of(description: records.Description) -> str:
-    """Return the row letter of a dataset, n, m, k or f as in the module, or "" for attributes."""
+    """Return the letter for the row count of a dataset (n, m, k or f, see the module); "" for attributes."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 

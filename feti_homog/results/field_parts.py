@@ -16,7 +16,7 @@ from feti_homog.typing import Float
 
 
 def header(cell: unit_cell.TornCell) -> Header:
-    """Return the file attributes of a cell."""
+    """Return the attributes of result.h5 for a cell."""
     case, plan = cell.case, cell.summary
     return Header(
         title=case.name,

@@ -42,7 +42,7 @@ def _given(document: Document) -> list[load_sections.Strain | load_sections.Mixe
 
 
 def changed_components(document: Document, leg: int | None = None) -> list[int]:
-    """Return the indices of the components that change at waypoint `leg`, from 1, or by default at any waypoint."""
+    """Return the indices of the components that change on leg number `leg`, from 1, or by default on any leg."""
     pairs, changed = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for number, target in enumerate(targets(document), start=1):
@@ -230,7 +230,7 @@ def rising_points(points: Sequence[Point]) -> Int:
 
 
 def table_of(points: Sequence[Point]) -> dict[str, Float]:
-    """Return the values (n,) at the points of all stresses, all strains and the temperature (0 if absent), by name."""
+    """Return arrays (n,) over the points, by name: all stresses, all strains, and the temperature (0 if absent)."""
     strains, names = voigt.voigt_names(len(points[0]["stress"]))
     rows = [[*point["stress"], *point["strain"], point.get("temperature") or 0.0] for point in points]
     return dict(zip((*names, *strains, load_sections.TEMPERATURE), np.array(rows, float).T, strict=True))

@@ -99,7 +99,7 @@ def write(directory: Path) -> list[Path]:
 
 
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
-    """Return load factor, mean strain and mean stress of a state by name, from its attributes, as rows (1, c).
+    """Return rows (1, c), by name, from the attributes of a state: load factor, mean strain and mean stress.
 
     Plane states have vectors with gamma12; other states have tensors (c = 9) with E12, and the temperature.
     """

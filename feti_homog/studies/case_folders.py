@@ -221,7 +221,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write case.toml with its defaults, without empty sections.  On one rank.  Raises FetiHomogError if it cannot."""
+    """Write case.toml with defaults, without empty sections.  On one rank.  Raises FetiHomogError if that fails."""
     document = {name: table for name, table in case.resolved().items() if table != {}}
     folder = directory / entry.folder
     atomic.remove_unfinished(folder, re.compile(rf"{CASE_FILE}|{ERROR_FILE}"))
@@ -248,7 +248,7 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
-    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if it cannot."""
+    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if that fails."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 

@@ -218,7 +218,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Lock a case and return COMPUTED, or return another outcome of `run` without a lock.  On one rank."""
+        """Lock a case to run and return COMPUTED, or return another outcome without a lock.  On one rank; see `run`."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)

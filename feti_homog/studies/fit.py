@@ -209,7 +209,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """Return the data (m,) computed at unknowns x (n,), once for each x.  On rank 0.  Raises if a case fails."""
+        """Return data (m,) computed at x (n,), once for each x.  Raises CaseError and ConvergenceError.  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:

@@ -99,7 +99,7 @@ class SweepTable:
 
     @cached_property
     def rising(self) -> list[Document]:
-        """The results of finished, loaded paths whose stress does not fall before their end."""
+        """The results of finished paths on which stress acts and does not fall before the end."""
         peaks = [(result, landmarks.peak_of(result)) for result in self.finished if "path" in result]
         return [result for result, peak in peaks if "stress_left" not in peak and "event" in peak]
 

@@ -82,7 +82,7 @@ class ScatterStudy(Study):
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
         """Return the content of uncertainty.json without its digest and warnings.
 
-        `means` are results at all means, `ends` a deviation below and above the means of the `inexact` numbers.
+        `ends` are results one standard deviation below and above the means of the `inexact` numbers.
         """
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
         values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
