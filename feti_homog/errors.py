@@ -24,14 +24,15 @@ def escaped(text: str, allowed: str = "") -> str:
 
 
 class FetiHomogError(Exception):
-    """An error printed for the user without a traceback, with a line for each of its `faults`.
-
-    A line keeps at most LONGEST_LINE characters, with its last KEPT_END; after MOST_FAULTS lines one counts the rest.
-    """
+    """An error printed for the user without a traceback, with a line for each of its `faults`."""
 
     exit_code = ExitCode.DEFECT
 
     def __init__(self, *faults: str) -> None:
+        """Keep the first MOST_FAULTS of the lines `faults`, and a count of the others.
+
+        A longer line keeps LONGEST_LINE characters, among them its last KEPT_END.
+        """
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]
         room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # the last fault, or a line with the count
@@ -58,10 +59,7 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge, a check failed, or nothing carries the load.
-
-    A result that is written nevertheless has the status `not converged`.
-    """
+    """A solve did not converge, a check failed, or nothing carries the load; a written result says `not converged`."""
 
     exit_code = ExitCode.UNCONVERGED
 

@@ -103,7 +103,7 @@ class FibreInfo:
 
 @dataclass(frozen=True)
 class SolverInfo:
-    """Sizes, iterations and convergence of the dual problem."""
+    """Sizes, iterations and convergence of the dual problems of a cell."""
 
     ranks: int = described("MPI ranks")
     bodies: int = described("number of bodies: the matrix and the fibres")

@@ -48,7 +48,7 @@ class Work:
     _load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies between the previous point and `point`."""
+        """Add the energies and the loss since the previous point, and continue from `point`."""
         # Loads never fall after the first leg.
         rise = self.largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released

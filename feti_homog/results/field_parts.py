@@ -139,7 +139,7 @@ def _at_nodes(
     in_plane: recovered_fields.NodalFields,
     along: recovered_fields.NodalFields | None = None,
 ) -> dict[str, Any]:
-    """Return displacements, and fields at interface nodes, by dataset name.  Without `along`, components on x3 are 0.
+    """Return displacements, and fields at interface nodes, by dataset name; without `along`, 0 along x3.
 
     If subdomains extend across materials, all interface nodes are bonded.
     """

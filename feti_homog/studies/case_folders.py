@@ -95,7 +95,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 def document_lock(directory: Path) -> Iterator[None]:
     """Context manager: lock the document of a study during a block.  On one rank.
 
-    Does nothing on a file system without locks.  Raises CaseError if a process holds the lock for INDEX_LOCK_TIMEOUT_S.
+    Without locks in the file system it locks nothing.  Raises CaseError if held elsewhere for INDEX_LOCK_TIMEOUT_S.
     """
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:

@@ -47,7 +47,7 @@ class SweepTable:
     Attributes:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a missing or partial result.
-        inputs: value of each case by dotted key, None if the key does not vary in the case.
+        inputs: value of each case by dotted key, None if the case does not set the key.
         outputs: values (cases,) by name, NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
     """
