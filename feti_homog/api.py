@@ -124,7 +124,7 @@ def run_fit(
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.
-        ConvergenceError: a case failed, or the data do not determine the unknowns.
+        ConvergenceError: a case failed, the data do not determine the unknowns, or the model does not fit the data.
     """
     with _started(comm, fit, out, ranks_per_case, retry) as comm:
         from feti_homog.studies import fit_file

@@ -31,7 +31,7 @@ class FetiHomogError(Exception):
     def __init__(self, *faults: str) -> None:
         """Keep the first MOST_FAULTS of the lines `faults`, and a count of the others.
 
-        A longer line keeps LONGEST_LINE characters, among them its last KEPT_END.
+        A line keeps at most LONGEST_LINE characters, among them its last KEPT_END.
         """
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]

@@ -224,7 +224,7 @@ def scales_with_toughness(document: Document) -> bool:
 
 
 def rising_points(points: Sequence[Point]) -> Int:
-    """Return the numbers of the points that a rising load reaches."""
+    """Return the numbers of the points at or above all earlier loads, which a rising load reaches."""
     load = np.array([point["load_factor"] for point in points])
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 

@@ -95,7 +95,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 def document_lock(directory: Path) -> Iterator[None]:
     """Context manager: lock the document of a study during a block.  On one rank.
 
-    Without locks in the file system it locks nothing.  Raises CaseError if held elsewhere for INDEX_LOCK_TIMEOUT_S.
+    Takes no lock if the file system has none.  Raises CaseError if another process holds it for INDEX_LOCK_TIMEOUT_S.
     """
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:

@@ -145,7 +145,7 @@ def estimate(
 
 
 def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:
-    """Minimize `squares` from `start` (n,) within bounds by Nelder and Mead's simplex.  `squares` records points."""
+    """Call `squares` along a search for its minimum from `start` (n,) within bounds, by Nelder and Mead's simplex."""
     size = _sizes(start)
     box = np.transpose(bounds) / size[:, None]
     options = {"maxfev": MOST_EVALUATIONS, "xatol": LEAST_CHANCE, "fatol": 1.0}

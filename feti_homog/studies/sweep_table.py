@@ -94,7 +94,7 @@ class SweepTable:
 
     @property
     def finished(self) -> list[Document]:
-        """The contents of result.json for all finished cases, without the others."""
+        """The contents of result.json for all finished cases."""
         return [document for document in self.documents if document is not None]
 
     @cached_property
