@@ -46,7 +46,7 @@ HOMES = {
     "draw_state": "report.plots.deformed_panels",
     "read_state": "results.viewed_states",
 }
-"""Modules of public names; other public names are in `api`."""
+"""Modules of public names that are imported on first access; names without an entry are in `api`."""
 
 
 def __dir__() -> list[str]:

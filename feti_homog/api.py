@@ -1,4 +1,4 @@
-"""Run cases, sweeps and fits from a Python program; PETSc starts with the first case."""
+"""Run cases, sweeps, fits and other MPI programs from Python; the first call starts PETSc."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ def run(
     resume: bool = False,
     quiet: bool = True,
 ) -> result.Result:
-    """Run a case on the ranks of `comm`, by default all ranks.
+    """Run a case on the ranks of `comm`, by default all ranks, and return its result on each of them.
 
     Collective over `comm`; other ranks need not take part.  Unless PETSc already runs, it starts with the options in
-    PETSC_OPTIONS; the options in the section `petsc` hold during this run.  Returns the result on every rank.
+    PETSC_OPTIONS; the options in the section `petsc` hold during this run.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; by default the run writes no files.
         fields: whether `result.fields` holds mesh, interface and states in memory, distributed over the ranks.
-        resume: with `out`, continue an interrupted path in the same folder.
+        resume: with `out`, continue an interrupted path in the same folder, or read its finished result.
         quiet: print nothing; otherwise print as the command line does.
 
     Raises:
@@ -75,9 +75,9 @@ def run_sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> sweep_table.SweepTable:
-    """Run the cases of a sweep, given as a file or document.  Collective.
+    """Run the cases of a sweep, given as a file or document, and return their table on every rank.  Collective.
 
-    Returns the table of the cases on every rank.  The same call resumes an interrupted sweep in `out`.
+    The same call resumes an interrupted sweep in `out`.  `comm` is as in `run`.
 
     Args:
         ranks_per_case: ranks of a case (default: all); groups of this size work concurrently.
@@ -120,11 +120,11 @@ def run_fit(
 ) -> dict[str, Any]:
     """Fit the unknowns in a file or document to measured values.  Collective.
 
-    Returns the content of fit.json on every rank.  Interruptions, arguments and other errors are as for `run_sweep`.
+    Returns the content of fit.json on every rank.  Arguments, other errors and resumption are as for `run_sweep`.
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.
-        ConvergenceError: a case failed, or the data do not determine the unknowns.
+        ConvergenceError: a case failed, the data do not determine the unknowns, or the model does not fit the data.
     """
     with _started(comm, fit, out, ranks_per_case, retry) as comm:
         from feti_homog.studies import fit_file
@@ -141,8 +141,8 @@ def launch(
 ) -> int:
     """Run `main(arguments, comm)` as a program, and return the exit code for `sys.exit`.  Collective.
 
-    PETSc reads the options in `argv` (default: of the process) with a single dash; `parser` reads the rest, and may
-    exit.  A FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
+    PETSc reads options with one dash in `argv` (default: the command line); `parser` reads the rest, and may exit.  A
+    FetiHomogError on all ranks is printed once and gives its exit code; other exceptions end the job on all ranks.
     """
 
     def command(words: Sequence[str], comm: Intracomm) -> int:
@@ -153,10 +153,10 @@ def launch(
 
 
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
-    """Start PETSc and run a command on all ranks.  Collective.
+    """Start PETSc and run a command on all ranks; return the exit code.  Collective.
 
-    PETSc takes its options from `argv` (default: of the process) and PETSC_OPTIONS; the command gets the other words.
-    Returns the exit code of `run_main`, or the code for missing libraries.
+    PETSc takes its options from `argv` (default: the command line) and PETSC_OPTIONS; the command gets the other words.
+    A FetiHomogError, also for missing libraries, is printed and gives its exit code, as in `run_main`.
     """
     words, petsc = option_values.split_argv(sys.argv[1:] if argv is None else argv)
     standard_streams.prepare()
@@ -179,7 +179,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
 
 
 def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
-    """Start PETSc with options `words` and PETSC_OPTIONS.  Collective.  Raises CaseError and LibraryError."""
+    """Start PETSc with the options in `words` and PETSC_OPTIONS.  Collective.  Raises CaseError and LibraryError."""
     others, of_environment = option_values.split_argv(os.environ.get("PETSC_OPTIONS", "").split())
     options = option_values.named_values([*of_environment, *words])
     faults = [f"PETSC_OPTIONS: {word}: expected options of PETSc and their values" for word in others]
@@ -195,7 +195,7 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def folder(name: str | Path) -> Path:
-    """Convert a name to a path.  Raises CaseError for null characters, and for "", which Path takes for "."."""
+    """Convert a folder name to a path.  Raises CaseError for null characters, and for "", which Path takes for "."."""
     if name == "":
         raise CaseError('"" is not a folder name; the current folder is "."')
     if "\0" in str(name):
@@ -219,9 +219,9 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 @contextlib.contextmanager
 def _started(comm: Intracomm | None, *arguments: object) -> Iterator[Intracomm]:
-    """Context manager: start PETSc unless it runs; yield `comm` (None: all ranks) to one thread.  Collective.
+    """Context manager: start PETSc unless it runs, and yield `comm`, by default MPI.COMM_WORLD.  Collective.
 
-    The arguments of the call must be equal on all ranks.  Raises like `run`.
+    The `arguments` of the call must be equal on all ranks, and no other thread may be inside.  Raises like `run`.
     """
     standard_streams.prepare()
     process.prefer_own_toolkits()
@@ -246,7 +246,7 @@ def _started(comm: Intracomm | None, *arguments: object) -> Iterator[Intracomm]:
 
 
 def _digest(arguments: tuple[object, ...]) -> str:
-    """Return a digest of the arguments of a call: cases, documents, file names, numbers.  Raises like `to_document`."""
+    """Digest the arguments of a call: cases, documents, file names, numbers.  Raises like `to_document`."""
     plain = [
         value.resolved() if isinstance(value, Case)
         else toml_files.to_document(value) if isinstance(value, Mapping)

@@ -1,7 +1,4 @@
-"""The command line, `feti-homog COMMAND ...`.
-
-Options with a double dash belong to feti-homog, options with a single dash to PETSc.
-"""
+"""Run the command line: options with a double dash belong to feti-homog, with a single dash to PETSc."""
 
 import argparse
 import importlib
@@ -19,7 +16,7 @@ GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: 
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command on all ranks, or `verify` without MPI, and return the exit code."""
+    """Run a command on all ranks (`verify` without MPI), and return the exit code."""
     words = sys.argv[1:] if argv is None else list(argv)
     ours, _ = option_values.split_argv(words)
     if ours[:1] == ["verify"]:

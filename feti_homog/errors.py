@@ -1,4 +1,4 @@
-"""The errors that the program prints for the user, and the exit codes."""
+"""Define the errors that the program prints for the user, and its exit codes."""
 
 import re
 from enum import IntEnum
@@ -19,19 +19,20 @@ class ExitCode(IntEnum):
 
 
 def escaped(text: str, allowed: str = "") -> str:
-    """Escape unprintable characters except `allowed`.  A terminal would obey control characters of a file."""
+    """Replace unprintable characters, except `allowed`, by escapes: a terminal would obey control characters."""
     return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
 class FetiHomogError(Exception):
-    """An error printed for the user, one line per fault, without a traceback.
-
-    Long lines keep LONGEST_LINE characters, among them the last KEPT_END; a line counts the faults after MOST_FAULTS.
-    """
+    """An error printed for the user without a traceback, with a line for each of its `faults`."""
 
     exit_code = ExitCode.DEFECT
 
     def __init__(self, *faults: str) -> None:
+        """Keep the first MOST_FAULTS of the lines `faults`, and a count of the others.
+
+        A line keeps at most LONGEST_LINE characters, among them its last KEPT_END.
+        """
         counts = {fault: int(count[1]) for fault in faults if (count := COUNT.search(fault))}
         lines = [fault for fault in faults if fault not in counts]
         room = MOST_FAULTS + (not counts and len(lines) == MOST_FAULTS + 1)  # the last fault, or a line with the count
@@ -58,17 +59,17 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge or a check failed.  The computed part is written as `not converged`."""
+    """A solve did not converge, a check failed, or nothing carries the load; a written result says `not converged`."""
 
     exit_code = ExitCode.UNCONVERGED
 
 
 class NotCarriedError(ConvergenceError):
-    """Nothing in the cell carries the prescribed load."""
+    """Nothing in the cell carries the prescribed stresses."""
 
 
 class NoMemoryError(FetiHomogError):
-    """A rank has no memory left, and all ranks know it."""
+    """A rank has no memory left; raised on all ranks."""
 
 
 class LibraryError(FetiHomogError):

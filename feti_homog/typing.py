@@ -1,4 +1,4 @@
-"""Name types: NumPy arrays, whose shapes docstrings give, documents such as result.json, and communicators."""
+"""Define names for types: NumPy arrays (docstrings give their shapes), documents such as result.json, communicators."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""Analyses of a torn cell: one module with `run(context)` for each [analysis] type, and the result of a case.
+"""Analyse a torn cell: one module with `run(context)` for each [analysis] type, and the `Result` of a case.
 
 Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `mesh`, `microstructure`, `report`, `results`,
 `schema` and `system`.  Main entries: `runner.run` (with files) and `runner.compute` (without).

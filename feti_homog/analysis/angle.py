@@ -1,4 +1,4 @@
-"""`analysis.type = "angle"`: the response against the debonding angle, Fig. 3."""
+"""`analysis.type = "angle"`: the response as a function of the debonding angle, Fig. 3 of the paper."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ from feti_homog.homogenization import averaging
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entry `angle`, with a point for each debonding angle.  Collective.
+    """Compute the `Result` entry `angle`, with a point for each debonding angle in the case.  Collective.
 
-    A point has the stress under the strain of the case or, without a strain, the stiffness from unit loads.  The solve
-    at an angle starts from the multipliers at the previous angle.
+    A point has the stress and energies under the strain of the case or, if the case gives none, the stiffness from unit
+    loads; also energy release rates at tips.  A solve starts from the multipliers at the previous angle.
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)

@@ -1,4 +1,4 @@
-"""Define the records of the cell, fibres, solver, checks and sensitivities in result.json."""
+"""Define the records in result.json for the cell, fibres, solver, checks, bounds, sensitivities and phase stresses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CellInfo:
-    """The meshed cell."""
+    """The sizes, phase fractions and mesh of the cell."""
 
     width: float = described("width of the cell", records.LENGTH)
     height: float = described("height of the cell", records.LENGTH)
@@ -46,7 +46,7 @@ class CellInfo:
 
 @dataclass(frozen=True, kw_only=True)
 class FibreInfo:
-    """One fibre, with the number N of `fibre = N` in case files."""
+    """One fibre: number N (for `fibre = N` in case files), phase, shape and bond strength."""
 
     number: int = described("number in `fibre = N` of case files, from 1")
     row: int | None = described("line in the fibre table, or position in `fibre_list`, from 1", default=None)
@@ -71,9 +71,9 @@ class FibreInfo:
 
     @classmethod
     def all_of(cls, case: Case, summary: domain_partition.CellSummary, factors: Float) -> tuple[FibreInfo, ...]:
-        """Return the records of the fibres, in the order of their numbers.
+        """Build the records of all fibres of a cell, in the order of their numbers.
 
-        `factors` (fibres,) are strength factors; centres are in the user's coordinates.
+        `factors` (fibres,) are the strength factors of their bonds.  Centres are in the user's coordinates.
         """
         bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
         ellipses = Ellipses(summary.centres, summary.frames)
@@ -103,7 +103,7 @@ class FibreInfo:
 
 @dataclass(frozen=True)
 class SolverInfo:
-    """Sizes, iterations and convergence of the dual problem."""
+    """Sizes, iterations and convergence of the dual problems of a cell."""
 
     ranks: int = described("MPI ranks")
     bodies: int = described("number of bodies: the matrix and the fibres")
@@ -130,7 +130,10 @@ class SolverInfo:
 
     @classmethod
     def of(cls, cell: unit_cell.TornCell, iterations: Sequence[int], reasons: Sequence[int]) -> SolverInfo:
-        """Return the record of all solvers, with the `iterations` and KSP `reasons` of each state.  Collective."""
+        """Build the record of all problems of a cell, without `options`.  Collective.
+
+        `iterations` and `reasons` (KSPConvergedReason) have an entry for each state.
+        """
         summary, solvers = cell.summary, [problem.solver for problem in cell.problems]
         cut = "pieces across the materials, for nothing can part" if summary.across else "bodies and pieces of bodies"
         uncut = "one subdomain, for nothing can part: one factor of the whole cell"
@@ -156,7 +159,7 @@ class SolverInfo:
 
 @dataclass(frozen=True)
 class Checks:
-    """The largest relative error of each law over all states."""
+    """The largest relative error of each law (strain, Hill, jump, contact, ...) over all states."""
 
     strain: float = described("mean strain, with the opening of debonded faces, equals E")
     hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
@@ -178,7 +181,7 @@ class Checks:
 
 @dataclass(frozen=True)
 class StiffnessBounds:
-    """Bounds on L^ef from the phases and their fractions, for any arrangement."""
+    """Bounds on the effective stiffness L^ef from phase stiffnesses and fractions, for any arrangement."""
 
     voigt: Float = described("upper bound of the stiffness: uniform strain", records.STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", records.STRESS, "(3, 3)")
@@ -187,7 +190,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of n cell constants with respect to p case constants, at fixed geometry."""
+    """Derivatives of n results of a cell with respect to p constants of its case file, at fixed geometry."""
 
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
@@ -204,7 +207,7 @@ class Sensitivities:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseStresses:
-    """The largest stresses of a phase in s states, at the integration points of the elements."""
+    """The largest stresses of one phase in each of s states, at the integration points of the elements."""
 
     phase: str = described("name of the phase")
     state: tuple[str, ...] = described("labels of the states, as in result.h5: `E11`, `load`, `event 12`, ...")

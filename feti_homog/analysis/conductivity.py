@@ -13,12 +13,12 @@ from feti_homog.typing import Float
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entries of a conductivity.  Collective.
+    """Compute the `Result` entries of a conductivity.  Collective.
 
-    These are `effective_conductivity`, closed forms and, on request, sensitivities and mesh errors.  The flux q and the
-    temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic gradient G and periodic T*,
-    as in axial shear with shear moduli k.  A gradient along the fibres has T* = 0 unless a phase has k13 or k23.
-    Column j of the result is -<q> under the unit gradient j.
+    These are `effective_conductivity` and, where they exist or are asked for, `conductivity_estimates`, `sensitivities`
+    and `mesh_error`.  Flux q and temperature T obey div q = 0, q = -k grad T, grad T = G + grad T* with the macroscopic
+    gradient G and periodic T*, as in axial shear with shear moduli k.  A gradient along the fibres has T* = 0 unless a
+    phase has k13 or k23.  Column j of the effective conductivity is minus the mean flux under the unit gradient j.
     """
     columns, errors, responses = context.unit_states(context.bonds(None), context.loads.zero_multipliers())
     k = columns["stiffness"]
@@ -40,10 +40,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates | None:
-    """Return closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.  Collective.
+    """Compute closed-form conductivities; None with voids, debonded arcs, or anisotropy in the plane.  Collective.
 
-    A fibre of radius a with interface conductance h acts like a fibre of conductivity 1 / (1/k + 1/(h a)).  Maxwell's
-    estimate is None without `fibre_radii`, bounds are None with conductances.
+    A fibre with radius a, conductivity k and interface conductance h acts like a perfectly bonded fibre of conductivity
+    1 / (1/k + 1/(h a)).  Maxwell's estimate is None if `fibre_radii` is None, bounds are None with conductances.
     """
     tensors = {phase: laws.conductivity(cell.case.material_of(phase)) for phase in cell.summary.phases}
     alike = all(np.array_equal(k, np.diag([k[0, 0], k[0, 0], k[2, 2]])) for k in tensors.values())
@@ -68,7 +68,7 @@ def closed_forms(cell: unit_cell.TornCell) -> phase_bounds.ConductivityEstimates
 def _note_bounds(
     context: AnalysisContext, k: Float, errors: Float, forms: phase_bounds.ConductivityEstimates, energy: float
 ) -> None:
-    """Compare k across the fibres with bounds, Hashin-Shtrikman's if isotropic, else Wiener's, by `note_outside`."""
+    """Check k across the fibres against bounds by `note_outside`: Hashin-Shtrikman's if isotropic, else Wiener's."""
     least, largest = np.linalg.eigvalsh((k + k.T)[:2, :2] / 2)
     error = np.asarray(errors[:2, :2].max())
     limits = forms.hashin_shtrikman if largest - least <= error else forms.wiener

@@ -1,4 +1,4 @@
-"""Compute constants that follow from the stiffness of a linear cell, with bounds, estimates and mesh errors."""
+"""Compute constants that follow from the stiffness of a linear cell, their bounds, estimates and mesh errors."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ OFF = 3.0  # largest ratio of the true energy error to the estimate
 
 
 def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the `Result` entries that follow from `effective_stiffness` and `thermal_stress`.  Collective.
+    """Compute the `Result` entries that follow from stiffness and thermal stress in `secants`.  Collective.
 
-    Returns {} for a plane cell with interfaces, and if faces touch without tension, since each stiffness column is then
-    a secant under a different load.  A cell with voids has no bounds.
+    Returns {} for a plane cell with interfaces, and where faces touch: each stiffness column is then a secant under
+    another load.  Cells with voids or debonded faces have no bounds and no estimates.
     """
     case, is_spatial = cell.case, len(cell.problems) > 1
     if "effective_stiffness_compression" in secants or (case.interfaces and not is_spatial):
@@ -51,10 +51,7 @@ def constants(cell: unit_cell.TornCell, secants: Mapping[str, Any]) -> dict[str,
 
 
 def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, Any]:
-    """Compute the constants of a stiffness, as `Result` entries.
-
-    The stiffness is (3, 3) or (6, 6), the thermal stress (6,) or None.
-    """
+    """Compute the `Result` entries of a stiffness, (3, 3) or (6, 6), and a thermal stress, (6,) or None."""
     if len(stiffness) == 3:
         return {"moduli": engineering_constants.engineering_moduli(stiffness)}
     compliance = np.linalg.inv(stiffness)
@@ -69,10 +66,10 @@ def stiffness_constants(stiffness: Float, thermal: Float | None) -> dict[str, An
 
 
 def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Return closed-form estimates and bounds for a cell without debonded faces.
+    """Compute `estimates` and `fibre_bounds`, as `Result` entries, for a cell without debonded faces.
 
-    Estimates exist for round fibres without coatings, held in the matrix by the same bonds; springs need one
-    radius in each phase.  Bounds exist for rigid bonds between transversely isotropic phases.
+    Estimates exist where `fibre_radii` returns radii.  Bounds exist for rigid bonds between transversely isotropic
+    phases.
     """
     from feti_homog.materials import estimates  # unused for bonded cells in the plane
 
@@ -99,9 +96,10 @@ def _comparisons(cell: unit_cell.TornCell, fractions: Mapping[str, float]) -> di
 
 
 def fibre_radii(cell: unit_cell.TornCell) -> dict[str, float] | None:
-    """Return a radius for each fibre phase, or None if closed forms do not apply.
+    """Return a radius for each fibre phase, or None if closed-form estimates do not apply.
 
-    Closed forms need round fibres without coatings, equal bonds for all phases and, with springs, one radius a phase.
+    Estimates need round fibres without coatings, equal bonds for all phases and, with springs, equal radii in a phase.
+    Without springs, a phase has the radius of its first fibre.
     """
     summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases) if k}
@@ -120,14 +118,15 @@ def mesh_error(
     of_plus: list[mesh_estimate.EnergyErrors],
     of_minus: list[mesh_estimate.EnergyErrors],
 ) -> dict[str, Any]:
-    """Return the `Result` entry `mesh_error`; {} without estimated errors.  Collective.
+    """Compute the `Result` entry `mesh_error`; {} without estimated errors.  Collective.
 
-    A constant f(C) of the stiffness C has the error max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|) with the parts
-    of `EnergyErrors`.  Notes an energy error above the accuracy of the case, and constants outside their bounds.
+    A constant f(C) of the stiffness C has the error max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|), with the
+    estimated error `signed` of C and its smallest size `least` if parts cancel (`EnergyErrors`).  Notes an energy error
+    above the accuracy of the case, and constants outside their bounds (`_note_bounds`).
 
     Args:
         secants: `effective_stiffness` and the entries that follow from it, as in `Result`.
-        of_plus, of_minus: errors under plus and, where faces touch, minus the unit loads.
+        of_plus, of_minus: energy errors under plus and minus the unit loads; `of_minus` is [] unless faces touch.
     """
     if not of_plus:
         return {}
@@ -151,7 +150,7 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh suffices if `energy`, the relative energy error on rank 0, exceeds `accuracy`.  Collective."""
+    """Note which mesh suffices if `energy`, the relative energy error on rank 0, is above `accuracy`.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None:
         return
@@ -167,10 +166,9 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
 def _note_bounds(
     context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside their bounds; record a fault for each that no mesh error explains.
+    """Check constants of a stiffness against their bounds, by `note_outside`.
 
-    The error of a constant is at most OFF times its estimate or, if larger, OFF `energy` times the constant, with the
-    largest relative energy error `energy`.  A bound applies only if the cell has the symmetry that the bound assumes.
+    A bound applies only if the cell has, within the mesh `errors`, the symmetry that the bound assumes.
     """
     limits: dict[str, Sequence[float]] = {}
     plane = secants.get("bounds")
@@ -190,10 +188,11 @@ def _note_bounds(
 def note_outside(
     context: AnalysisContext, limits: Mapping[str, Sequence[float]], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note each value outside its limits; record a fault if the excess is more than the error in `_note_bounds`.
+    """Note each value outside its limits; record a fault if no mesh error explains the excess.
 
-    An excess within the tolerance of the checks may come from the solver and does not count.  The limits bound
-    constants of periodic cells; the function skips cells with other boundaries.
+    The mesh explains an excess up to OFF times the estimated error of the value or, if larger, OFF `energy` |value|,
+    with the relative energy error `energy`.  An excess within the tolerance of the checks may come from the solver and
+    does not count.  The limits bound constants of periodic cells; cells with other boundaries are not checked.
     """
     if context.case.cell.boundary != "periodic":
         return
@@ -213,9 +212,9 @@ def note_outside(
 def state_error(
     context: AnalysisContext, responses: Sequence[averaging.Response]
 ) -> tuple[dict[str, float], list[averaging.Response]]:
-    """Estimate the mesh error of the energy under one load.  Collective.
+    """Estimate the relative mesh error of the stored energy under one load.  Collective.
 
-    Returns the entry `mesh_error`, error / energy (nothing if the case has `mesh_error = false`), and the responses
+    Returns {"mesh_error": error}, or {} if the case has `mesh_error = false`; and the responses (one for each problem)
     with element errors.
     """
     errors, estimated = context.response_errors([[response] for response in responses])
@@ -227,9 +226,9 @@ def state_error(
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note a mesh error above the `accuracy` of the case under the first nonzero load.  Collective.
+    """Solve for the first nonzero load of a path; note a mesh error above the `accuracy` of the case.  Collective.
 
-    Notes nothing without `accuracy` or `mesh_error`, or if the cell does not carry the load.
+    Does nothing without `accuracy` or `mesh_error` in the case, and notes nothing if the cell does not carry the load.
     """
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
@@ -243,12 +242,12 @@ def check_accuracy(context: AnalysisContext) -> None:
 
 
 def energy_error(stiffness: Float, errors: list[mesh_estimate.EnergyErrors]) -> dict[str, float]:
-    """Return the entry `mesh_error`, the largest relative energy error under any strain; {} without errors."""
+    """Return {"mesh_error": e}, with the largest relative energy error e under any strain; {} if `errors` is empty."""
     return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[str, Float]:
-    """Return the part `name`, one of PARTS, of stiffness and thermal stress errors; {} without errors."""
+    """Assemble the errors `name` (one of PARTS) of stiffness and thermal stress by `Result` entry; {} without any."""
     if not errors:
         return {}
     entries = phase_laws.secants(*(getattr(error, name) for error in errors))
@@ -256,7 +255,7 @@ def _secants(errors: Sequence[mesh_estimate.EnergyErrors], name: str) -> dict[st
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
-    """Return the constants of a stiffness by name; for (6, 6) also nu31, nu32 and, with heat, expansions."""
+    """Compute constants of a stiffness by name; (6, 6) adds nu31, nu32 and, with a thermal stress, expansions (6,)."""
     entries = stiffness_constants(stiffness, heat)
     compliance = entries.pop("compliance", None)
     named: dict[str, Any] = {"thermal_expansion": entries.pop("thermal_expansion", None)}
@@ -268,9 +267,9 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 
 
 def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
-    """Return the largest relative strain energy error under any strain.
+    """Return the largest relative strain energy error under any strain.  `parts` maps each of PARTS to `_secants`.
 
-    If the stiffness is not positive definite, return the largest relative error under a unit strain.
+    If the stiffness is not positive definite, returns the largest relative error under a unit strain.
     """
     symmetric = (stiffness + stiffness.T) / 2
     if np.linalg.eigvalsh(symmetric)[0] <= 0:

@@ -1,4 +1,4 @@
-"""Hold the cell under its loads, the checks, the recorders and the progress of an analysis run."""
+"""Hold the state of an analysis run: the cell under its loads, checks, recorders, progress and notes."""
 
 from __future__ import annotations
 
@@ -44,50 +44,50 @@ class CellLoads:
         self.names = tuple(name for problem in self.problems for name in problem.loads)
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """Return the load of a waypoint, which maps names of strains and stresses to values.  Other stresses are 0."""
+        """Convert a waypoint, a mapping of strain and stress names to values, to a load.  Unnamed stresses are 0."""
         stress = dict(zip(voigt.SPATIAL_STRAINS, voigt.SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
 
     def zero_multipliers(self) -> list[Float]:
-        """Return zero multipliers for each unit load, as first iterates."""
+        """Return zero multipliers (owned rows,) for each unit load, as first iterates."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def by_problem(self, responses: Sequence[averaging.Response]) -> list[list[averaging.Response]]:
-        """Group the responses to the unit loads by problem."""
+        """Split a list of responses, one for each unit load, into a list for each problem."""
         rest = iter(responses)
         return [[next(rest) for _ in problem.loads] for problem in self.problems]
 
     def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[averaging.Response]:
-        """Return the responses to `scale` times an equilibrium, one for each problem.  Collective.
-
-        Arguments and errors are as in `Homogenization.response`.
-        """
+        """Return each problem's response to `scale` times an equilibrium (`Homogenization.response`).  Collective."""
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
     def undetermined(self, responses: Sequence[averaging.Response]) -> list[str]:
-        """Name the strains that a load leaves undetermined.  Collective."""
+        """Name the strains that the load of the responses (one for each problem) leaves undetermined.  Collective."""
         pairs = zip(self.problems, responses, strict=True)
         masks = np.concatenate([problem.interface.undetermined(response.state) for problem, response in pairs])
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the largest `LoadScales.excess` of the states of responses.  Collective."""
+        """Return the largest ratio of strains in the responses to strains of the bonded cell under the same load."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 
     def secants(self, responses: Sequence[averaging.Response], sign: float) -> dict[str, Float]:
-        """Return the secant `stiffness`, Eq. (39), and `thermal_stress` (6,).
+        """Assemble the secant `stiffness`, Eq. (39), and the `thermal_stress` (6,).
 
-        The stiffness is (3, 3) or (6, 6).  `responses` belong to `sign` times each unit load; the thermal stress needs
-        a temperature among the loads.
+        `responses` belong to `sign` times each unit load.  The stiffness is (3, 3) or (6, 6), in conduction the
+        conductivity (3, 3); the thermal stress is left out unless a temperature is a load.
         """
         groups = self.by_problem(responses)
         return phase_laws.secants(*(np.stack([sign * r.stress for r in group], axis=1) for group in groups))
 
     def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
-        """Return macroscopic `strain` and `stress`, and `temperature` if it is a load."""
+        """Return macroscopic `strain` and `stress`, and `temperature` if it is a load, by name.
+
+        `responses` has one for each problem under the same load.
+        """
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
         heat = {"temperature": float(responses[0].strain[-1])} if "temperature" in self.names else {}
@@ -103,14 +103,14 @@ class AnalysisContext:
         checks: checks of all responses so far.
         states: recorder of states.
         progress: printed lines and bars.
-        directory: folder of the result, if any, where path events are stored.
+        directory: folder of the result, where path events are stored; None without files.
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
         events: name of the file with the lines about all path events.
         opening: returns, as text, the entries of result.json that are known before the analysis.  Collective.
-        undetermined: undetermined strains at each point under one load.
-        excess: largest ratio of the strains under one load to the strains of the bonded cell.
-        notes: remarks on the result.
+        undetermined: names of undetermined strains; `loaded_point` adds a list for each point.
+        excess: largest ratio of strains under one load to strains of the bonded cell, over all loaded points.
+        notes: remarks on the result, which analyses append.
     """
 
     loads: CellLoads
@@ -130,7 +130,7 @@ class AnalysisContext:
     def of(
         cls, cell: unit_cell.TornCell, progress: standard_streams.Progress, states: StateRecorder | None = None
     ) -> AnalysisContext:
-        """Return a context without a folder; without a recorder `states`, no fields are kept."""
+        """Return a context without a folder.  Without a recorder `states`, no fields are kept."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         return cls(CellLoads(cell, contact), CheckRecorder(cell.solver.rtol), recorder, progress)
@@ -151,7 +151,7 @@ class AnalysisContext:
         return self.cell.case
 
     def bonds(self, opening: float | None) -> BondState:
-        """Return the initial bond state.  `opening` is the default angle of debonded arcs in degrees."""
+        """Return the initial bond state.  Debonded arcs without an angle of their own open by `opening` degrees."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, BONDED).astype(np.int8))
 
     def response_errors(
@@ -159,7 +159,8 @@ class AnalysisContext:
     ) -> tuple[list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
         """Estimate the mesh errors of responses, given as one group for each problem.  Collective.
 
-        Returns the errors of each group, [] if `mesh_error = false`, and all responses, recovered here for later steps.
+        Returns the errors by problem, [] if `mesh_error = false`, and a flat list of responses with element errors and,
+        where later steps need them, inner displacements.
         """
         has_tips = any(response.debonded for group in groups for response in group)
         if self.states.is_recording or self.case.output.sensitivities or has_tips:
@@ -182,8 +183,8 @@ class AnalysisContext:
     ) -> tuple[dict[str, Float], list[mesh_estimate.EnergyErrors], list[averaging.Response]]:
         """Solve for `sign` times the unit loads, estimate mesh errors, and record the states.  Collective.
 
-        The solves start from the multipliers `starts`.  Returns `CellLoads.secants`, errors and responses.  A state has
-        the name `label` + load, with a minus for a negative `sign`; see `StateRecorder.record`.
+        Solves start from multipliers `starts`.  Returns `CellLoads.secants`, errors by problem, and all responses.
+        States have the name `label` + load, with a minus for a negative `sign`, and the point number `point`.
         """
         prefix = f"{label}-" if sign < 0 else label
         responses = list[averaging.Response]()
@@ -204,7 +205,7 @@ class AnalysisContext:
 
     @cached_property
     def checkpoint(self) -> checkpoints.EventsInMemory:
-        """Return the store of path events, in the folder or in memory.  Collective when first read."""
+        """The store of path events, in the folder or in memory.  Collective when first read; may raise CaseError."""
         from feti_homog.results import checkpoints  # only paths have events
 
         comm, jumps, room = self.cell.comm, self.cell.solver.jump_operator, checkpoints.room_of(self.case)
@@ -217,18 +218,21 @@ class AnalysisContext:
 
     @cached_property
     def tip_zones(self) -> list[energy_release.TipZones]:
-        """Return the zones about tips of arcs in each problem.  Collective when first read."""
+        """The zones about tips of debonded arcs, for energy release rates, by problem.  Collective when first read."""
         from feti_homog.homogenization import energy_release  # bonded cells have no tips
 
         return [energy_release.TipZones(problem.cell) for problem in self.loads.problems]
 
     @cached_property
     def fibre_interfaces(self) -> averaging.FibreInterfaces:
-        """Return the fibre interfaces of the cell.  Collective when first read."""
+        """The fibre interfaces of the cell.  Collective when first read."""
         return averaging.FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Build result.json entries: debonding under gamma12 or the only load, and summed iterations.  Collective."""
+        """Build the result.json entries of a point on debonding and iterations.  Collective.
+
+        Debonding is under gamma12 or, with a single load, under this load; iterations are summed over the responses.
+        """
         last = responses[: len(voigt.STRAINS)][-1]
         length = self.fibre_interfaces.length(last.state.status != BONDED)
         debonding = {
@@ -241,9 +245,9 @@ class AnalysisContext:
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-        """Return the means, energies and debonding of a point under one load.  Collective.
+        """Build the entries of a point under one load: means, energies, debonding, iterations.  Collective.
 
-        Also adds the undetermined strains of the point to `undetermined`, and updates `excess`.
+        Also appends the undetermined strains of the point to `undetermined`, and updates `excess`.
         """
         self.undetermined.append(self.loads.undetermined(responses))
         self.excess = max(self.excess, self.loads.excess(responses))
@@ -253,7 +257,7 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """Return the notes, and remarks on singular stresses, undetermined strains and absurd strains."""
+        """List `notes`, and remarks on singular stresses, undetermined strains and absurdly large strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses beside {' and '.join(places)} rise without limit with finer elements")
@@ -268,7 +272,7 @@ class AnalysisContext:
         return lines
 
     def warnings(self) -> list[str]:
-        """Return the warnings about settings that are probably unintended."""
+        """List valid but probably unintended settings: process zones, element sizes, solver tolerance."""
         summary = self.cell.summary
         zones = cell_remarks.warnings(self.case, summary.width, summary.interface_edge, summary.radii)
         return [*zones, *self.checks.warnings()]

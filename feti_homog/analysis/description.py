@@ -1,4 +1,4 @@
-"""The text of `feti-homog check`, which describes the run of a case on these ranks and its cost."""
+"""Describe a case and the cost of its run on these ranks, as `feti-homog check` prints them."""
 
 from collections.abc import Iterator, Sequence
 
@@ -18,9 +18,9 @@ from feti_homog.system.petsc import options_database
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """Describe a run of the case on these ranks, with the PETSc options of the case.  Collective.
+    """Describe a case and its run on these ranks, with the PETSc options of the case.  Collective.
 
-    The text is empty except on rank 0.  Raises CaseError and MeshError as `unit_cell.tear` does.
+    Returns text on rank 0, "" elsewhere.  Raises CaseError and MeshError if the cell cannot be meshed and torn.
     """
     with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -63,10 +63,10 @@ def _cost_lines(
     subdomains: Sequence[int],
     nodes: Sequence[int],
 ) -> Iterator[str]:
-    """Yield lines about the solver, ranks and memory.  A path adds the memory for complete debonding.
+    """Yield lines about the solver, ranks and memory; for a path also memory for complete debonding.
 
-    `subdomains` and `nodes` have a count for each rank; operators of pieces are dense by default.  Raises CaseError
-    like `solver_plan.choose`, or if a case with friction has no influence columns.
+    `subdomains` and `nodes` have a count for each rank.  Raises CaseError for PETSc options that exclude each other,
+    and for a solver without influence columns in a case with friction.
     """
     problems, ranks, is_dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across
@@ -96,7 +96,7 @@ def _cost_lines(
 
 
 def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[str]:
-    """Yield lines about the fibres: counts and sizes, debonded arcs, mixed phases, and the match of positions."""
+    """Yield lines about fibres: number, sizes, debonded arcs, phases of a mix, and how closely a table is matched."""
     if case.interface is not None or case.cell.table is not None or case.cell.has_own_mesh:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())

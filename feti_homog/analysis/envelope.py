@@ -29,11 +29,11 @@ CHUNK = 200_000
 
 @dataclass(frozen=True)
 class Rays:
-    """The macroscopic states on n rays, start + f direction, f >= 0.
+    """The macroscopic states on n rays, start + f direction with a load factor f >= 0, in m = 3 or 6 components.
 
     Attributes:
         strain, stress: (n, m) directions.
-        strain_before, stress_before: (m,) starts, after the temperature change.
+        strain_before, stress_before: (m,) common start, after the temperature change.
         temperature: temperature change.
     """
 
@@ -45,10 +45,10 @@ class Rays:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
+    """Compute the `Result` entries `envelope`, `effective_stiffness` and its constants.  Collective.
 
-    `envelope` lists directions with the load at which the first bond breaks; all other entries follow from unit loads.
-    Raises CaseError if faces in the mesh are debonded and may touch, and like `criterion_of`.
+    `envelope` lists directions with the load at which the first bond breaks; unit loads give all other entries.  Raises
+    CaseError if debonded faces of the mesh may touch, or if the bond law needs another solver (`criterion_of`).
     """
     section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, load_sections.Envelope)
@@ -74,10 +74,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays at angles (n,), in degrees, from the first axis.
+    """Construct the rays in a plane of two stresses or two strains, named by `plane`.
 
-    `plane` names both axes.  With the stiffness C, stress rays have the strains E = C^-1 S for the stresses S, and
-    begin at zero stress after the temperature change, if there is a `thermal_stress`; strain rays begin at zero strain.
+    `angles` (n,) are in degrees from the first axis.  Stress rays S begin at zero stress, with strains C^-1 S for the
+    stiffness C; strain rays begin at zero strain; both after the temperature change, if `thermal_stress` exists.
     """
     strains, stresses = voigt.voigt_names(len(stiffness))
     by_stress = plane[0] in stresses
@@ -119,7 +119,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """Yield the fields of `EnvelopePoint`, without angle, for each ray, or {} if no bond breaks.  Collective."""
+        """Yield a dict for each ray: `EnvelopePoint` without its angle, {} if no bond breaks.  Collective."""
         names = voigt.voigt_names(rays.strain.shape[1])[0]
         start = np.tensordot(self._unit_loads(rays.strain_before[None], rays.temperature, names), self._unit, axes=1)[0]
         used = self._onset.utilisation(start, np.arange(len(start)))
@@ -155,16 +155,16 @@ class _Finder:
                 yield point | section | dict(zip(self._break_names, shares, strict=True))
 
     def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
-        """Express strains (n, m) and a temperature by unit loads; return the coefficients (n, l)."""
+        """Return the coefficients (n, l) of the l unit loads that combine to strains (n, m) and a temperature."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
         return np.stack([column[load] for load in self._loads], axis=1)
 
     def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
-        """Return the first break on each ray as a row.  Collective.
+        """Find the first break on each of n rays.  Collective.
 
-        A row has the least factor, inf without a break; fibre, interface and direction of the bond; and the law's
-        numbers for the break.  Ties: lowest fibre, then interface, then direction.
+        Returns a row for each ray: the least factor, inf without a break; fibre, interface and direction of the bond;
+        the mode by `BondLaw.breaks`.  Ties: lowest fibre, then interface, then direction.
 
         Args:
             factors: (n, k) factors at which each bond breaks.

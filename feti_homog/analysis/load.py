@@ -11,10 +11,10 @@ from feti_homog.materials import voigt
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entry `load`, the equilibrium with prescribed debonded faces.  Collective.
+    """Compute the `Result` entry `load`, the equilibrium with prescribed debonded faces.  Collective.
 
-    With interfaces the point has `tips`, empty without debonded arcs.  The case may also ask for `sensitivities`.
-    Raises NotCarriedError if the cell does not carry the stresses.
+    In a case with interfaces the point has `tips`, empty without debonded arcs.  On request there are also
+    `sensitivities`.  Raises NotCarriedError if the cell does not carry the stresses.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     load = context.loads.load(target)

@@ -1,4 +1,4 @@
-"""`analysis.type = "path"`: debonding along a path of loads, Section III.F, Fig. 5."""
+"""`analysis.type = "path"`: debonding along a path of loads, Section III.F and Fig. 5 of the paper."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -30,8 +30,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """Follow the path of the case and return its `Result` entries.  Collective.
 
     `path` has each event or increment, `peak` the landmarks, `resumed` the count of restored points, and `states` the
-    numbers of the points with recorded fields, if any; without points only `path` and `resumed` exist.  New converged
-    points are stored.  Raises like `criterion_of`, `resumable` and `_points`.
+    numbers of points with recorded fields, if any; without points only `path` and `resumed` exist.  New converged
+    points are stored.  Raises CaseError like `criterion_of` and for a faulty checkpoint, NotCarriedError like
+    `_points`.
     """
     path, law, cell = context.case.section, criterion_of(context.cell, grows=True), context.loads.interfaces
     assert isinstance(path, load_sections.LoadPath)
@@ -83,7 +84,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], checkpoints.Arrays]) -> None:
-    """Write the event of point `number` to the checkpoint, and name its use after an interruption.  Collective."""
+    """Write the event of point `number` to the checkpoint; prepare the remark for an interruption.  Collective."""
     context.checkpoint.write(number, *event)
     if context.directory is not None:
         folder = context.directory
@@ -94,7 +95,7 @@ def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], ch
 def _record_checks(
     context: AnalysisContext, place: str, responses: Sequence[averaging.Response], is_first: bool
 ) -> None:
-    """Record the checks of the responses at one point; print new faults and the line of the first point."""
+    """Record and log the checks of responses at a point; print the line of the first point, and lines of new faults."""
     for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
         faults = len(context.checks.faults)
         line = context.checks.record(f"{place}{problem}", response)
@@ -106,11 +107,11 @@ def _record_checks(
 def _points(
     context: AnalysisContext, path: load_sections.LoadPath, law: BondLaw, stored_events: int
 ) -> Iterator[tuple[path_points.Point, path_events.Before | None, list[averaging.Response]]]:
-    """Yield each point with its responses.  Collective.
+    """Yield (point, `Before` or None, responses) along the path.  Collective.
 
-    First come the `stored_events` of the checkpoint, with the result of `path_events.restored`, then new points with
-    None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no equilibrium.
-    Raises NotCarriedError if the cell does not carry the stresses of the first point.
+    First come the `stored_events` of the checkpoint, each with the result of `path_events.restored`, then new points
+    with None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no
+    equilibrium.  Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = path_points.unloaded(cell, context.bonds(None))
@@ -148,7 +149,7 @@ def _points(
 
 
 def _with_advice(error: NotCarriedError, place: str, path: load_sections.LoadPath) -> NotCarriedError:
-    """Return the error that ends a path, with a remedy.  Before the first point `place` is empty."""
+    """Return the error that ends a path, with a remedy and the last point, `place` (empty before the first point)."""
     if isinstance(error, coulomb_faces.StuckError):
         more = "" if path.method == "events" else " or more increments"
         return coulomb_faces.StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
@@ -160,7 +161,7 @@ def _label(path: load_sections.LoadPath, number: int) -> str:
 
 
 def _without_lists(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a point without the lists over fibres, which would fill result.json."""
+    """Return the entries of a point without lists over fibres, which only points with kept fields have."""
     return {name: value for name, value in entry.items() if name not in OF_FIBRES}
 
 
@@ -171,7 +172,7 @@ def _entry(
     responses: Sequence[averaging.Response],
     work: path_events.Work,
 ) -> dict[str, Any]:
-    """Return the fields of the `PathPoint` record of a point.  Collective."""
+    """Build the entries of a `PathPoint`, except for tips, mesh error and mark.  Collective."""
     energies, damage = work.all_equilibria, law.damage(point.state.bonds)
     entry: dict[str, Any] = {
         "load_factor": point.load_factor,
@@ -201,10 +202,11 @@ def _completed(
     bonds: Sequence[tuple[float, float]],
     last: path_points.Point,
 ) -> dict[str, Any]:
-    """Return the `Result` entries `path`, `peak` and, with recorded fields, `states` of a path.  Collective.
+    """Build the `Result` entries `path`, `peak` and, if states are recorded, `states`.  Collective.
 
-    Marks landmarks in `entries`, adds tips and mesh errors at the kept points, records fields there, and drops lists
-    over fibres elsewhere.  `peak` names the most utilised of `bonds`.  The checkpoint has all kept points but the last.
+    Changes `entries` in place: marks landmarks, adds tips and mesh errors at the kept points, and drops lists over
+    fibres elsewhere.  Records the fields of the kept points, whose events, except the `last`, must be in the
+    checkpoint.  `bonds` has the most utilised bond (fibre, direction) of each point, which `peak` names at landmarks.
     """
     document = {"case": context.case.resolved(), "path": entries}
     marks = landmarks.marks(document)
@@ -251,7 +253,7 @@ def _completed(
 def _checked(
     context: AnalysisContext, point: path_points.Point, name: str
 ) -> tuple[path_points.Point, Sequence[averaging.Response]]:
-    """Complete a path point by products with the dual operator, and check its responses; return both.  Collective."""
+    """Complete a path point by products with the dual operator; return it and its checked responses.  Collective."""
     point = replace(point, state=context.loads.interfaces.completed(point.state))
     responses = context.loads.responses(point.state, point.scale)
     for response in responses:

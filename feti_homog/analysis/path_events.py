@@ -1,4 +1,4 @@
-"""Accumulate the energies of a path, and convert its points to checkpoint events and back."""
+"""Accumulate the energies of a path, convert its points to checkpoint events and back, and check stored events."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -36,9 +36,9 @@ class Work:
 
     Attributes:
         all_equilibria: energies along all equilibria, where each bond breaks at its break load, with snap-back.
-        load_controlled: loss if the load only rises on the first leg, as in a test.  A bond in a snap-back then
-            breaks at the largest load t so far and loses (t / break load)^2 times the energy, because the response
-            is homogeneous in the load.
+        load_controlled: loss if the load only rises on the first leg, as in a test.  A bond that breaks in a snap-back,
+            at the load factor b, then breaks at the largest factor t so far.  The response is proportional to the load,
+            so the loss is (t / b)^2 times the loss along all equilibria.
         largest_load: largest load factor so far.
     """
 
@@ -48,14 +48,14 @@ class Work:
     _load: float = 0.0
 
     def arrive(self, point: path_points.Point) -> None:
-        """Add the energies between the previous point and `point`."""
+        """Add the energies and the loss since the previous point, and continue from `point`."""
         # Loads never fall after the first leg.
         rise = self.largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
     def resume_from(self, energies: path_points.Energies, load_controlled: float, point: path_points.Point) -> None:
-        """Continue from a stored point, with the energies up to this point."""
+        """Continue from a stored `point` with the energies and the load-controlled loss up to it."""
         self.all_equilibria, self.load_controlled = energies, load_controlled
         self._load, self.largest_load = point.load_factor, max(point.load_factor, self.largest_load)
 
@@ -68,10 +68,9 @@ def stored(
     cell: coupled_interfaces.CoupledInterfaces,
     entry: Mapping[str, Any],
 ) -> tuple[dict[str, Any], checkpoints.Arrays]:
-    """Split a point into plain numbers and distributed arrays for the checkpoint.
+    """Split a path point into plain values, equal on all ranks, and this rank's arrays, for the checkpoint.
 
-    A resumed path continues from the multipliers of the last state.  `bond` comes from
-    `tip_records.most_utilised_bond`; `entry` is the point's entry in result.json.
+    `bond` comes from `tip_records.most_utilised_bond`; `entry` is the point's entry in result.json.
     """
     after = point.after
     numbers: dict[str, Any] = {
@@ -109,9 +108,9 @@ def stored(
 
 
 def restored(event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces) -> tuple[path_points.Point, Before]:
-    """Rebuild a path point from an event.
+    """Rebuild a path point, and its `Before`, from a checkpoint event.
 
-    Arrays for which the checkpoint had no room are empty; `found_again` computes them.
+    Multipliers, jumps and amplitudes for which the checkpoint had no room are empty; `found_again` computes them.
     """
     states = list[Equilibrium]()
     for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
@@ -142,7 +141,7 @@ def restored(event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfac
 
 
 def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoads) -> list[averaging.Response]:
-    """Restore the responses at a point from its event.  Collective."""
+    """Restore the responses at a point, one for each problem, from its event, without fields.  Collective."""
     responses = list[averaging.Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
@@ -155,7 +154,7 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
 
 
 def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces) -> path_points.Point:
-    """Return a point with its equilibrium solved again, for an event without multipliers.  Collective."""
+    """Solve the equilibrium of a point again, for an event without multipliers; return the point.  Collective."""
     loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
     values, by_stress = zip(*loads, strict=True)
     load = Load(np.concatenate(values), np.concatenate(by_stress))
@@ -164,7 +163,7 @@ def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterf
 
 
 def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read an event and rebuild its path point; solve for missing multipliers.  Collective; may raise CaseError."""
+    """Read event `number` and rebuild its point; solve for missing multipliers.  Collective; may raise CaseError."""
     event, cell = context.checkpoint.read(number), context.loads.interfaces
     point, _ = restored(event, cell)
     if "lam" not in event:
@@ -175,8 +174,8 @@ def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, pat
 def resumable(context: AnalysisContext) -> int:
     """Count the checkpoint events that a run can reuse.  Collective.
 
-    A run that does not resume drops all events and returns 0; a resumed run reuses the events before the first invalid
-    event.  Raises CaseError if the checkpoint cannot be used.
+    A run without --resume drops all events and returns 0; a resumed run reuses the events before the first invalid one.
+    Raises CaseError if the checkpoint is damaged or of another run.
     """
     say = context.progress.say
     if not context.resume:
@@ -194,7 +193,7 @@ def resumable(context: AnalysisContext) -> int:
 
 
 def consistent(context: AnalysisContext, count: int) -> int:
-    """Count the first events whose arrays, bonds, loads and energies fit the path.  Collective; raises like `read`."""
+    """Count the leading events whose arrays, bonds, loads and energies fit the path.  Collective; raises CaseError."""
     cell, layout, work, bonds = context.loads.interfaces, _layout(context), Work(), context.bonds(None)
     ends = [context.loads.load(target) for target in context.case.targets]
     waypoints, legs = [Load(0.0 * ends[0].values, ends[0].by_stress), *ends], len(ends)
@@ -224,8 +223,8 @@ def consistent(context: AnalysisContext, count: int) -> int:
 def holding(context: AnalysisContext, count: int) -> int:
     """Count the valid events among the first `count` of the checkpoint.  Collective; raises like `read`.
 
-    Completes and checks all events since products F lambda with the dual operator F last confirmed every problem.  A
-    failed check or a wrong mean makes its event and all later events invalid.
+    Products F lambda with the dual operator F confirm a solution.  All events since every problem was last confirmed
+    are completed and checked; a failed check or a wrong mean stress invalidates its event and all later events.
     """
     first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
     while first:
@@ -247,7 +246,7 @@ def holding(context: AnalysisContext, count: int) -> int:
 
 
 def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Return types and shapes of this rank's arrays in an event.  Collective."""
+    """Return the type character and shape of each array of this rank in an event, by name.  Collective."""
     cell, bonds = context.loads.interfaces, context.bonds(None)
     if context.case.has_friction:
         bonds = replace(bonds, gap_and_slip=np.zeros((len(bonds.status), 2)), sliding=bonds.status)
@@ -266,7 +265,7 @@ def _layout(context: AnalysisContext) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping[str, Any], before: BondState) -> int:
-    """Count this rank's bonds that part.  Returns -1 for wrong arrays, impossible numbers, or bonds that heal."""
+    """Count this rank's bonds that part after `before`; -1 for arrays unlike `layout`, wrong numbers or healing."""
     has_all = "lam" in event
     expected = {name: kind for name, kind in layout.items() if has_all or not checkpoints.FOUND_AGAIN.fullmatch(name)}
     if {name: (array.dtype.char, array.shape) for name, array in event.items()} != expected:
@@ -289,10 +288,10 @@ def _parted(context: AnalysisContext, event: checkpoints.Arrays, layout: Mapping
 
 
 def _bond_arrays(bonds: BondState, suffix: str) -> checkpoints.Arrays:
-    """Return the arrays of a bond state, with suffixed names."""
+    """Return the arrays of a bond state by field name + `suffix`, without fields that are None."""
     return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
 def _bond_state(event: checkpoints.Arrays, suffix: str) -> BondState:
-    """Rebuild a bond state from the arrays that `_bond_arrays` made; absent arrays become None."""
+    """Rebuild a bond state from arrays that `_bond_arrays` named; missing arrays become None."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]

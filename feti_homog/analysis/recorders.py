@@ -1,4 +1,4 @@
-"""Record the checks of the responses of a run (convergence, errors of laws), and states with fields."""
+"""Record the checks of all responses in a run (convergence, errors of laws), and its states with fields."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -44,9 +44,9 @@ class CheckRecorder:
     faults: list[str] = field(default_factory=list)
 
     def record(self, name: str, response: averaging.Response) -> str:
-        """Record the checks of a response and return a line about the response.
+        """Record the checks of a response under the name of its state; return a line about the response.
 
-        A solve without convergence and a failed check are faults.
+        A solve without convergence and a failed check add lines to `faults`.
         """
         state, error = response.state, response.checks.get("jump")
         reason = state.solution.reason
@@ -68,9 +68,9 @@ class CheckRecorder:
         return f"  {name}: {line}"
 
     def require(self, name: str, errors: Mapping[str, float]) -> None:
-        """Record the errors of laws; NaN and exceeded tolerances are faults."""
+        """Record errors by law; NaN and errors above the tolerance add lines, which begin with `name`, to `faults`."""
         for law, error in errors.items():
-            self.errors[law] = max(error, self.errors.get(law, 0.0))
+            self.errors[law] = float(np.maximum(error, self.errors.get(law, 0.0)))  # NaN stays
             tolerance = self.tolerance(law)
             if not error <= tolerance:
                 self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
@@ -82,7 +82,7 @@ class CheckRecorder:
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
 
     def warnings(self) -> list[str]:
-        """Return a warning line if the solver tolerance is looser than the checks, else []."""
+        """Return [a warning] if the solver tolerance is looser than the checks, else []."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
         end = f"the result is marked unless their errors are at most {MAX_CHECK_ERROR:g}"
@@ -90,13 +90,13 @@ class CheckRecorder:
 
 
 class StateRecorder:
-    """A recorder of states and of the largest phase stresses.  Fields go to a file, to memory or nowhere.
+    """A recorder of states and of the largest phase stresses.  Fields go to `file`, if any, and to memory if `keep`.
 
     Attributes:
         has_place: whether fields are recorded.
         is_recording: whether states are recorded, for fields or for the utilisation of strengths.
         singularities: descriptions of points near which the largest stresses have no limit.
-        error: the write error, if any, after which the run continues without the file.
+        error: the error of the first failed write, after which the run continues without the file; else None.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class StateRecorder:
         self.singularities = set[str]()
 
     def record(self, states: Mapping[str, Sequence[averaging.Response | None]], load_factor: float, point: int) -> None:
-        """Record states by label, with a response or None for each problem, if `is_recording`.  Collective."""
+        """Record labelled states, each with a response or None for each problem, if `is_recording`.  Collective."""
         if not self.is_recording:
             return
         fields = recovered_fields.recover(self._cell, [*states.values()])
@@ -129,12 +129,12 @@ class StateRecorder:
                 self._states.append(state)
 
     def seal(self) -> result_json.FileSeal | None:
-        """Complete the file and return its seal.  Returns None without a file or after a write error.  Collective."""
+        """Complete result.h5 and return its seal; None without a file or after a write error.  Collective."""
         self._write(field_file.FieldFile.close)
         return None if self._file is None else mpi_errors.on_root(self._cell.comm, result_json.seal, self._file.path)
 
     def _write(self, write: Callable[..., object], *arguments: object) -> None:
-        """Write to the file, if any.  After an error, continue without the file."""
+        """Call `write(file, *arguments)` if there is a file; after a FetiHomogError warn, and drop the file."""
         if self._file is not None:
             try:
                 write(self._file, *arguments)
@@ -143,7 +143,7 @@ class StateRecorder:
                 self._say(f"warning: {error}; the remaining results are computed without it")
 
     def phase_stresses(self) -> tuple[PhaseStresses, ...] | None:
-        """Return the largest stresses of each phase in all states.  Returns None without recorded stresses."""
+        """Return the largest stresses of each phase in all recorded states; None without stresses."""
         phases = dict.fromkeys(phase for state in self._largest for phase in state)
         return tuple(map(self._of_phase, phases)) or None
 
@@ -163,7 +163,7 @@ class StateRecorder:
         return PhaseStresses(phase=phase, state=tuple(self._labels), **columns)
 
     def fields(self) -> Fields | None:
-        """Return this rank's fields.  Returns None unless the run keeps fields in memory.  Collective."""
+        """Return this rank's fields; None unless the run keeps fields in memory.  Collective."""
         if not self._keep:
             return None
         cell = self._cell

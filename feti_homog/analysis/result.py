@@ -24,16 +24,16 @@ Part = TypeVar(
 
 @dataclass(frozen=True, repr=False)
 class Fields:
-    """This rank's part of the fields; `gathered` joins all parts.
+    """This rank's part of the fields of a result; `gathered` joins the parts of all ranks.
 
     Attributes:
         header: cell size, phases, units.
         mesh: points (n, 2), triangles (m, 3 or 6), their bodies and phases; nodes are torn between subdomains.
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
-        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and
-            the numbers of these nodes in the gathered mesh.
-        states: for each load, angle or kept path point: displacement (n, 2), stress (m, 3), traction and jump
-            (k, 2), status (k,), with strain, mean stress, load factor and label.
+        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) at the fibre-matrix interface nodes, and the
+            numbers of these nodes in the gathered mesh.
+        states: for each load, angle or kept path point: displacement (n, 2), stress (m, 3), traction and jump (k, 2),
+            status (k,), with strain, mean stress, load factor and label.
     """
 
     comm: Intracomm
@@ -59,7 +59,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Gather the rows of a part on rank 0, in rank order.  Returns None on other ranks.  Collective."""
+    """Gather the tables of a part on rank 0, row by row in rank order; None on other ranks.  Collective."""
     parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
     if comm.rank:
         return None
@@ -73,7 +73,7 @@ class Result:
 
     `print` shows a short summary, a notebook shows tables.  The manual lists all keys of result.json; entries that the
     analysis does not compute are None.  Constants are attributes, too: `result.E1` comes from `moduli` or `constants`.
-    `fields` has the mesh, interface and states on this rank, if the run keeps them; it is not in result.json.
+    `fields` has the mesh, interface and states on this rank, or None unless the run keeps fields; result.json lacks it.
     """
 
     schema: int = described("version of this layout", default=result_json.SCHEMA)
@@ -164,7 +164,7 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """Build a result from the content of result.json.  Raises KeyError for a missing key."""
+        """Restore a result from the content of result.json.  Raises KeyError, TypeError or ValueError if faulty."""
         return records.restored(cls, document)
 
     @property
@@ -175,11 +175,11 @@ class Result:
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Return the values at n angle or path points, as arrays by name.
+        """The values at n angle or path points, as arrays by name; {} for other analyses.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
-        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,), without tips; NaN where a point has no number.
-        Empty for other analyses.
+        `debonded_length` (n, f) of f fibres, `bonded`, `open`, `closed`, ... (n,), without tips; NaN where a point has
+        no number.
         """
         documents = [records.plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         values = {name: value for point in documents for name, value in point.items() if name != "tips"}
@@ -187,11 +187,11 @@ class Result:
         return {name: np.array([point.get(name, gap) for point in documents]) for name, gap in gaps.items()}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Return the response of a one-leg path to a rising load.
+        """Return the stress-strain response of a one-leg path to a rising load, as in a test.
 
-        The arrays (v,) by name have the corners of the curves: first the leading strain, then all stresses.  As in a
-        test, the stress drops to the next stable branch where bonds break; under a prescribed stress the strain jumps.
-        Raises ValueError for any other result, and if the strain does not rise with the load.
+        Arrays (v,) by name have the v corners of the curves: the leading strain first, then all stresses.  Where bonds
+        break, the stress drops to the next stable branch or, under a prescribed stress, the strain jumps.  Raises
+        ValueError for any other result, and if the leading strain does not rise with the load.
         """
         from feti_homog.results import path_curves  # unused in other analyses
 
@@ -204,10 +204,7 @@ class Result:
         return {self.peak.strain_name: sign * curve[:, -1]} | stresses
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number by its name in a record of CONSTANTS, such as E1.
-
-        Raises AttributeError, which names the record with this attribute, or similar names.
-        """
+        """Return a number, such as E1, of a record in CONSTANTS.  Raises AttributeError with a hint for other names."""
         parts = {key: vars(part) for key, part in vars(self).items() if is_dataclass(part)}
         table = {key: value for record in CONSTANTS for key, value in parts.get(record, {}).items()}
         if name in table:

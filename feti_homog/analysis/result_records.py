@@ -1,7 +1,7 @@
 """Define the records of points, tips and mesh errors in result.json, which are fields of `result.Result`.
 
 Strains are [E11, E22, gamma12], in generalized plane strain [E11, E22, E33, gamma23, gamma13, gamma12].  Stresses are
-[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  They and energies per cell area have the unit of the moduli.
+[S11, S22, S12] or [S11, S22, S33, S23, S13, S12].  Stresses and energies per cell area have the unit of the moduli.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ DEBONDED_SHARES = "the same share for each [[interface]] section, in order; abse
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshErrors:
-    """The estimated mesh errors, from the distance between recovered and element stresses."""
+    """The mesh errors of a stiffness or conductivity, estimated by the difference of recovered and element stresses."""
 
     effective_stiffness: Float | None = described("error of each entry", records.STRESS, EITHER_STIFFNESS, default=None)
     effective_stiffness_compression: Float | None = described(
@@ -51,10 +51,10 @@ class MeshErrors:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t tips at a path point, by fibre, interface and direction.
+    """The t tips at a path point, sorted by fibre, interface and direction.
 
-    A tip is an intact bond next to a broken bond.  The driving energy per area, which compares with G_c(psi), is the
-    energy of the spring or, where `growth` is "released", the energy that a break would release.
+    A tip is an intact bond next to a broken bond.  Its driving energy per area, which compares with the toughness
+    G_c(psi), is the energy of its spring or, where `growth` is "released", the energy that its break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
@@ -69,9 +69,10 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
-    """The energy release rates at tips of arcs, at constant macroscopic strain and temperature.
+    """The energy release rates at tips of debonded arcs, at constant macroscopic strain and temperature.
 
-    Only round fibres have rates.  The t pairs of a load and a tip are sorted by load, fibre, interface and direction.
+    Only round fibres have rates.  The t rows, each for a load and a tip, are sorted by load, fibre, interface and
+    direction.
     """
 
     load: tuple[str, ...] = described(
@@ -128,7 +129,7 @@ class AnglePoint:
 
 @dataclass(frozen=True, kw_only=True)
 class PathPoint:
-    """A path point: break, contact change, end of leg or increment."""
+    """One point of a path: a break, a contact change, the end of a leg, or an increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
     strain: Float = described("macroscopic strain", "", EITHER, **OF_STRAINS)
@@ -187,10 +188,10 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress on a path before the deepest fall of the stress.
+    """The largest stress on a path before the deepest fall of the stress, and landmarks before it.
 
-    The component is conjugate to the largest changing strain on the leg where damage begins under stress; if only the
-    temperature changes, it has the largest stress.
+    The stress component is conjugate to the largest strain that changes on the leg where damage begins under stress.
+    If only the temperature changes, it is the component with the largest stress.
     """
 
     stress_name: str = described("name of the component")
@@ -254,10 +255,7 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """The debonding onset along one direction in a plane of stresses or strains.
-
-    If no load in this direction breaks a bond, only `angle` has a value.
-    """
+    """The debonding onset in one direction of a plane of stresses or strains; without one, only `angle` is set."""
 
     angle: float = described("direction of the load in the plane, from the first axis to the second", records.DEGREES)
     factor: float | None = described(

@@ -1,4 +1,4 @@
-"""Run one case: tear the cell, solve, homogenize and check; write the result if there is a folder."""
+"""Run one case: tear the cell, solve, homogenize, check, and write the result if there is a folder."""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -36,11 +36,11 @@ def run(
 ) -> Result:
     """Run a case, write its result to `directory`, and return the result.  Collective over `progress.comm`.
 
-    `resume` continues from the checkpoint, or reads the finished result; `keep_fields` adds the fields.
+    `resume` continues from the checkpoint, or reads a finished result; `keep_fields` sets `Result.fields`.
 
     Raises:
         CaseError, MeshError: before any result is written; also for another run's checkpoint or a folder in use.
-        ConvergenceError: after the result has been written and marked.
+        ConvergenceError: after a result with faults has been written; or without a result, if nothing carries the load.
         FetiHomogError: a file cannot be written.
     """
     comm = progress.comm
@@ -62,11 +62,11 @@ def run(
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
-    """Return the result of a case on every rank, with fields if `keep_fields`, without files.  Collective.
+    """Compute the result of a case, on every rank, without files; `keep_fields` sets `Result.fields`.  Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
-        ConvergenceError: a solve did not converge or a check failed; the summary is printed before, unless `quiet`.
+        ConvergenceError: no convergence or a failed check, after a summary unless `quiet`; or nothing carries the load.
     """
     progress = standard_streams.Progress(comm, quiet)
     with _torn(case, comm, progress) as cell:
@@ -81,7 +81,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) -> Iterator[unit_cell.TornCell]:
-    """Context manager: tear the cell, and free it at the end, under the PETSc options of the case.  Collective.
+    """Context manager: tear the cell under the PETSc options of its case; free the cell at the end.  Collective.
 
     Turns LinAlgError, from matrices singular by rounding, into ConvergenceError.
     """
@@ -107,7 +107,7 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: standard_streams.Progress) 
 def _run_and_write(
     cell: unit_cell.TornCell, directory: Path, progress: standard_streams.Progress, resume: bool, keep_fields: bool
 ) -> Result:
-    """Analyse a torn cell like `run`, write the files, and return the result.  Collective.  Raises FetiHomogError."""
+    """Analyse a torn cell, write the files, return the result, faulty or not.  Collective.  Raises FetiHomogError."""
     output, file = cell.case.output, None
     if output.fields:
         with progress.stage("output") as line:
@@ -157,7 +157,7 @@ def _run_and_write(
 
 
 def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
-    """Write result.json and the other result files; remove files of earlier results.  Collective."""
+    """Write result.json, its tables and XDMF files; remove other result files from the folder.  Collective."""
     mpi_errors.on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if cell.case.section.is_followed:
@@ -173,7 +173,7 @@ def _write(result: Result, directory: Path, cell: unit_cell.TornCell) -> None:
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """Warn about the cell, run the analysis of the case, and return its `Result` entries.  Collective."""
+    """Print warnings, run the module of the case's analysis, and return its `Result` entries.  Collective."""
     for warning in (*context.cell.summary.warnings(), *context.warnings()):
         context.progress.say(f"warning: {warning}")
     with context.progress.stage("solve") as line:
@@ -187,7 +187,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _opening(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entries known before the analysis, with errors and times so far.  Collective."""
+    """Build the `Result` entries known before an analysis, with checks, remarks and times so far.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions, options = cell.fractions(), options_database.choices("feti_")
     asked = sum(cell.case.cell.fractions.values())
@@ -228,7 +228,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
 
 
 def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Build the result from the entries of an analysis, with counts and timings.  Collective."""
+    """Build the result from the `Result` entries of a finished analysis and from the context.  Collective."""
     checks = context.checks
     entries = _opening(context) | {"checks": Checks(**checks.errors), "faults": tuple(checks.faults)}
     status = "not converged" if checks.faults else "done"
@@ -236,10 +236,7 @@ def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Field
 
 
 def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
-    """Print the summary on rank 0, without faults.  Collective.
-
-    The error that follows states the faults.  Other ranks load no tables.
-    """
+    """Print the summary of a result on rank 0, without its faults, which the later error prints.  Collective."""
     timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text import summary

@@ -1,4 +1,4 @@
-"""Differentiate stiffness, its constants, conductivity or a loaded state with respect to constants of the case."""
+"""Differentiate a stiffness, its constants, a conductivity or a loaded state with respect to case constants."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,13 +21,13 @@ Constant = tuple[str, float]
 def sensitivities(
     context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[averaging.Response], one_sided: bool
 ) -> dict[str, Any]:
-    """Return the `Result` entry `sensitivities` of a stiffness or conductivity.  Collective.
+    """Compute the `Result` entry `sensitivities` of a stiffness or conductivity.  Collective.
 
     Args:
         document: the entry `effective_conductivity`; or `effective_stiffness` and, if a temperature is a load,
             `thermal_stress`.
         responses: the responses to all unit loads.
-        one_sided: whether debonded faces touch without tension; then faces are fixed in the derivative of each column.
+        one_sided: whether debonded faces touch without tension; then each column is differentiated at fixed faces.
     """
     conductivity, groups = document.get("effective_conductivity"), context.loads.by_problem(responses)
     columns = dict[Constant, list[float]]()
@@ -54,7 +54,7 @@ def sensitivities(
 
 
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[averaging.Response]) -> dict[str, Any]:
-    """Return the `Result` entry `sensitivities` of the state under one load.  Collective.
+    """Compute the `Result` entry `sensitivities` of the state under one load.  Collective.
 
     The faces stay fixed as in the state.  With macroscopic strains x, stresses s and the cell stiffness A for these
     faces, A x = s; the load prescribes x or s in each component.  The free strains follow from A dx = -dA x; the stored
@@ -82,7 +82,7 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
 
 
 def _entry(values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], is_fixed: bool) -> dict[str, Any]:
-    """Build the entry `sensitivities` from values, derivatives (`columns`) by parameter, and `at_fixed_status`."""
+    """Build {"sensitivities": record} from values by name and, for each parameter, a column of their derivatives."""
     matrix = np.array([*columns.values()]).T
     record = Sensitivities(
         parameters=tuple(name for name, _ in columns),
@@ -96,13 +96,13 @@ def _entry(values: Mapping[str, float], columns: Mapping[Constant, Sequence[floa
 
 
 def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
-    """Assemble stiffness and thermal stress, None without temperature, from `Derivative.energies`."""
+    """Assemble derivatives of stiffness and thermal stress (None without temperature) from `Derivative.energies`."""
     changed = phase_laws.secants(*energies)
     return changed["stiffness"], changed.get("thermal_stress")
 
 
 def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, float]:
-    """Return the entries of a stiffness or conductivity, and the normal thermal stresses, if any, by name."""
+    """Name the entries of a matrix `C`, as in C11 for `symbol` "C", and the normal thermal stresses, if any."""
     entries = {f"{symbol}{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
     normal = {} if thermal is None else dict(zip(voigt.THERMAL_STRESSES[:3], map(float, thermal[:3]), strict=True))
     return entries | normal
@@ -111,9 +111,10 @@ def _entries(C: Float, thermal: Float | None, symbol: str = "C") -> dict[str, fl
 def _at_status(
     context: AnalysisContext, name: str, states: Sequence[averaging.Response], problems: Sequence[int]
 ) -> list[list[averaging.Response]]:
-    """Return lists of responses to unit loads, for `problems`, with faces fixed as in the state `name`.  Collective.
+    """Solve for unit loads with faces fixed as in a loaded state; return the responses by problem.  Collective.
 
-    `states` are its responses, `problems` indices of `context.loads.problems`.  Checks without contact are recorded.
+    `states` are the responses of the state `name`, `problems` the indices of the problems to solve.  Records the
+    checks, except contact.
     """
     groups, bonds = list[list[averaging.Response]](), states[0].state.bonds
     for number in problems:

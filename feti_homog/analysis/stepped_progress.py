@@ -16,10 +16,10 @@ SECONDS_A_LINE = 60.0
 def shown(
     progress: standard_streams.Progress, label: str, clock: Callable[[], float] = time.monotonic
 ) -> Iterator[Callable[[float, int, str, bool], object]]:
-    """Context manager: show the finished share of a computation, the rate of steps, and times.
+    """Context manager: show the finished share of a stepped computation, the rate of steps, and times.
 
     The block calls the yielded `advance(share, count, text, known)` after each step; `known` steps, such as restored
-    steps, took no time.  The time left assumes that the share keeps growing at its mean rate since the last known step.
+    ones, took no time.  The time left assumes that the share keeps growing at its mean rate since the last known step.
     """
     if (within := progress.within) is not None:
         yield lambda share, count, text, known: within(share, f"{label} {share:.0%}, {text}")

@@ -1,4 +1,4 @@
-"""Run `analysis.type = "stiffness"`: the effective stiffness; with contact, secants under unit loads of both signs."""
+"""`analysis.type = "stiffness"`: the effective stiffness; with contact, secants under unit loads of both signs."""
 
 from typing import Any
 
@@ -8,11 +8,11 @@ from feti_homog.homogenization import averaging
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """Return the `Result` entry `effective_stiffness` and the constants that follow from it.  Collective.
+    """Compute the `Result` entry `effective_stiffness` and the constants that follow from it.  Collective.
 
-    Contact between debonded faces adds `effective_stiffness_compression`, with columns -Sigma(-E); debonded arcs add
-    `tips` under each load; a temperature among the loads adds `thermal_stress` under a unit temperature and, with
-    contact, `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
+    Contact between debonded faces adds `effective_stiffness_compression`, whose column j is -Sigma(-e_j) under minus
+    the unit strain e_j; debonded arcs add `tips` under each load; a temperature among the loads adds `thermal_stress`
+    and, with contact, `thermal_stress_compression`.  The case may also ask for `mesh_error` and `sensitivities`.
     """
     bonds, starts = context.bonds(None), context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0

@@ -1,4 +1,4 @@
-"""Read stored results, and check that the files of a folder are complete and from one run."""
+"""Read stored results, and check that the files in a folder are complete and from one run."""
 
 import os
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from feti_homog.schema import keys, wording
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Read a result or an unfinished path, and check its result.h5, if any.  Call on one rank.
+    """Read the document of a result or unfinished path; check result.h5 if the case stores fields.  Call on one rank.
 
     Raises CaseError if a file is missing, damaged, or from another program or run.
     """
@@ -31,10 +31,10 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> str:
-    """Check that the plottable files in `directory` belong to one run.  Call on one rank.
+    """Check that the files in `directory` from which pictures are drawn belong to one run.  Call on one rank.
 
-    A folder without result.json and checkpoint needs result.h5.  Returns the status of an unfinished path, else "".
-    Raises CaseError if a needed file is missing, or a file is damaged, or from another program or run.
+    Without result.json and checkpoint, result.h5 must exist.  Returns a phrase with points and load of an unfinished
+    path, else "".  Raises CaseError if a needed file is missing, or a file is damaged, or from another program or run.
     """
     # `lexists` is also true for a circular link.
     if os.path.lexists(directory / result_json.NAME) or (directory / checkpoints.FOLDER).is_dir():
@@ -44,7 +44,7 @@ def check_to_draw(directory: Path) -> str:
 
 
 def finished(directory: Path, case: Case, ranks: int) -> bool:
-    """Return whether a folder has the complete result of a case and no checkpoint.  Call on one rank.
+    """Return whether a folder has the finished result of a case, with its fields, and no checkpoint.  Call on one rank.
 
     Raises CaseError if the result or checkpoint is damaged or of another case, or the checkpoint of another rank count.
     """
@@ -75,7 +75,7 @@ def finished(directory: Path, case: Case, ranks: int) -> bool:
 
 
 def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int, skipped: str = "name") -> NoReturn:
-    """Raise CaseError with the text `start` and the keys or ranks that differ from `stored`, except in `skipped`."""
+    """Raise CaseError with `start` and the keys or ranks that differ from the document `stored`, except `skipped`."""
     idle = [("output", name) for name, entry in keys.keys_of(sections.Output).items() if entry.presentation]
     idle += [("path", "max_events"), ("cell", "file"), ("cell", "match")]  # the digest has the content of files
     ignored, n_before = ("name", "petsc", skipped), stored["solver"]["ranks"]

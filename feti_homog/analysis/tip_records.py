@@ -1,4 +1,4 @@
-"""Collect the debonding tips in result.json, with their bond law, driving energies, release rates and modes."""
+"""Collect debonding tips for result.json, with energy release rates and modes; find bond law and critical bonds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -21,10 +21,10 @@ DIRECTION_DIGITS = 9
 
 
 def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
-    """Return the bond law for growing debonding if `grows`, else for the onset of debonding.  Collective.
+    """Return the bond law that decides on breaks along a path if `grows`, else on the first break.  Collective.
 
-    The law of released energies needs tips: growing debonding creates them, prescribed debonded faces have them.
-    Raises CaseError if tips need the inverse dual operator, which the solver does not have.
+    With `growth = "released"`, released energies decide wherever tips may be: on a path, or at prescribed debonded
+    faces.  Raises CaseError if they need the inverse dual operator, which only `-feti_pc_type influence` has.
     """
     law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, energy.SpringEnergy) and cell.case.interfaces[0].growth == "released"):
@@ -40,9 +40,9 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:
-    """Return energy release rates at tips under each load but a unit temperature; empty without tips.  Collective.
+    """Compute energy release rates at tips under each load but a unit temperature; no rows without tips.  Collective.
 
-    A unit load has one response, in the problem with a load of this name; other loads have one in each problem.
+    `responses` maps a unit load to its only response, and any other load to a response for each problem.
     """
     rates = list[tuple[energy_release.EnergyRelease, str]]()
     for load, parts in responses.items():
@@ -65,10 +65,10 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
 
 
 def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Tips:
-    """Return the tips at a path point, by fibre, interface and direction.  Collective.
+    """Compute the tips at a path point, sorted by fibre, interface and direction.  Collective.
 
     A tip is an intact bond next to a broken bond.  Its utilisation sqrt(G / G_c(psi)) and mode tan^2 psi = G_II / G_I
-    determine G_I and G_II, energies per area.
+    determine its energies per area G_I and G_II.
     """
     cell, loaded, bonds = context.cell, context.loads.interfaces, point.state.bonds
     traction = point.scale * loaded.traction(point.state.solutions)
@@ -90,7 +90,7 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
 
 
 def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> tuple[float, float]:
-    """Return fibre number, from 1, and direction of a new point's most utilised bond.  Collective.
+    """Return the fibre number, from 1, and the direction of the most utilised bond at a new path point.  Collective.
 
     Ties: lowest fibre, then direction (degrees).  Returns (NaN, NaN) if no bond carries more than the solver's error.
     """
@@ -108,14 +108,14 @@ def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_point
 
 
 def _sections(cell: unit_cell.TornCell, pair: Float | Int) -> tuple[int, ...] | None:
-    """Return [[interface]] section numbers, from 1, for indices `pair`, or None in cases with at most one section."""
+    """Convert section indices `pair` to [[interface]] numbers from 1; None in cases with at most one section."""
     return tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
 
 
 def bond_directions(cell: unit_cell.TornCell) -> Float:
-    """Return the directions (k,) from fibre centres to this rank's interface nodes.
+    """Return the directions (k,) of this rank's interface nodes from the centres of their fibres.
 
-    Directions are in degrees, above -180.  A node of a fibre without centre has the direction of its normal.
+    Directions are in degrees in (-180, 180].  At a fibre without a centre, the direction of the normal stands in.
     """
     normal = cell.solver.jump_operator.nodes.normal
     of_normals = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))

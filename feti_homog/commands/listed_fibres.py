@@ -20,8 +20,8 @@ def table(source: Path) -> str:
     """Return the fibre table of a case file or result folder as text.  On one rank.
 
     The table has a row for each fibre and void, with the fibre number.  Ellipses have the columns `a`, `b` and `angle`,
-    coatings `coating`, hollow fibres `inner_radius`, polygons `sides` and `corner`.  Numbers are exact: the table
-    reproduces the cell, unless a mesh has other shapes: they have no radius, no centre if they wind around the torus.
+    coatings `coating`, hollow fibres `inner_radius`, polygons `sides` and `corner`.  Exact numbers reproduce the cell.
+    Other shapes in a mesh have no radius, and no centre if they wind around the cell.
 
     Raises:
         CaseError, MeshError: the source is faulty, or does not list its voids.
@@ -92,17 +92,17 @@ class ListedFibres:
 
     @property
     def radii(self) -> Float:
-        """The radii (N,) of circles, and of equal-area discs for ellipses."""
+        """The radii (N,) of circles, of equal-area discs for ellipses, and NaN without semi-axes."""
         return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
 
 
 def read(source: Path) -> ListedFibres:
-    """Read the fibres of a case file or result folder.  On one rank.  Raises CaseError or MeshError if it is faulty."""
+    """Read the fibres of a case file or result folder.  On one rank.  Raises CaseError or MeshError if faulty."""
     return _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
 
 
 def _of_result(directory: Path) -> ListedFibres:
-    """Read the fibres of a result, or of its case if the result lacks voids or outlines."""
+    """Read the fibres from result.json, or from the case in it if result.json lacks voids or outlines."""
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
     is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in fibres) and not cell.get("porosity")

@@ -1,4 +1,4 @@
-"""Find the round fibres in a micrograph: list them in a table for [cell] geometry = "table", and draw them."""
+"""Find the round fibres in a micrograph, list them in a table for [cell] geometry = "table", and draw them."""
 
 from pathlib import Path
 
@@ -10,10 +10,10 @@ from feti_homog.typing import Float
 
 
 def fibres(path: Path, pixel: float) -> tuple[Float, str]:
-    """Return the round fibres in an image as circles (n, 3) and as a table.  On one rank.
+    """Return the round fibres in an image as circles (n, 3), and as the text of a fibre table.  On one rank.
 
-    Circles are x, y and radius; `pixel` is the side of a pixel.  Raises CaseError for a faulty image or one without
-    fibres.
+    A circle has x, y and radius; `pixel` is the side of a pixel in the same unit.  Raises CaseError for a faulty image,
+    and if it shows no round fibres.
     """
     image = label_image.read_image(path, is_grey=True)[::-1].astype(float)  # the first row of an image is the upper one
     if not -1e100 < image.min() < image.max() < 1e100:

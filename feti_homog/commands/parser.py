@@ -1,4 +1,4 @@
-"""Parse the command line: commands, options, and the name "module.function" of the function to call."""
+"""Parse the command line: commands, options, and "module.function" of `commands` for each command."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ SCATTER_HELP = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A command-line parser that raises CaseError for errors, so that the program exits with code 2."""
+    """A command-line parser that raises CaseError for faulty arguments."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
 
 
 def command_parser() -> Parser:
-    """Build the parser of all commands."""
+    """Build the parser of `feti-homog`, with all commands."""
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
@@ -83,7 +83,7 @@ def command_parser() -> Parser:
 
 
 def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
-    """Add the commands for results to a parser."""
+    """Add the commands that make products of a result, and `fibres`, to the subparsers `commands`."""
     of_result = [
         _command(commands, "products.plot", "draw the pictures of a results folder again"),
         _command(commands, "products.report", "write report.html, one page with everything in a results folder"),
@@ -125,7 +125,7 @@ def _add_products(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
-    """Add the commands for studies of many cases to a parser."""
+    """Add the commands for studies of many cases to the subparsers `commands`."""
     sweep = _command(commands, "studies.sweep", "run the cases of a file with [sweep]", SWEEP_HELP)
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
     sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, with a subfolder for each case")
@@ -152,28 +152,28 @@ def _add_studies(commands: argparse._SubParsersAction[Parser]) -> None:
 def _command(
     commands: argparse._SubParsersAction[Parser], action: str, summary: str, description: str | None = None
 ) -> Parser:
-    """Add a command with the name of the function that it calls, `action` = "module.function"; return its parser."""
+    """Add the command that calls `action` = "module.function", with the function's name; return its parser."""
     parser = commands.add_parser(action.partition(".")[2], help=summary, description=description)
     parser.set_defaults(action=action)
     return parser
 
 
 def integer(word: str) -> int:
-    """Convert text to an integer of at most nine digits.  Raises ValueError."""
+    """Convert a word to an integer of at most nine digits.  Raises ValueError for other words."""
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)
 
 
 def length(word: str) -> float:
-    """Convert a word to a length above 0.  Raises ArgumentTypeError."""
+    """Convert a word to a length above 0.  Raises ArgumentTypeError for other words."""
     if not re.fullmatch(r"[0-9]{0,9}\.?[0-9]{0,9}(e-?[0-9])?", word) or not re.search("[1-9]", word.partition("e")[0]):
         raise argparse.ArgumentTypeError(f"{word!r}: expected a length above 0, such as 0.5")
     return float(word)
 
 
 def size(word: str) -> tuple[float, float]:
-    """Convert a word such as 9x7.5 to two lengths in centimetres, at least 2.  Raises ArgumentTypeError."""
+    """Convert a word such as 9x7.5 to two lengths in centimetres, each at least 2.  Raises ArgumentTypeError."""
     is_pair = re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,3})?x[0-9]{1,3}(\.[0-9]{1,3})?", word)
     if not is_pair or min(map(float, word.split("x"))) < 2.0:  # less than a picture's text needs
         raise argparse.ArgumentTypeError(f"{word!r}: expected width and height of at least 2 cm, such as 9x7")

@@ -1,4 +1,4 @@
-"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: make the products of a result."""
+"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`: make pictures, pages, VTK files, cards, fibre tables."""
 
 import argparse
 
@@ -10,7 +10,7 @@ from feti_homog.typing import Intracomm
 
 
 def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Draw the pictures of a stored result again; print their paths.  Collective."""
+    """Draw the pictures of a stored result or unfinished path again; print their paths.  Collective."""
     from feti_homog.report.plots import figures, plot_helpers
 
     directory = output_folder.result_folder(arguments.directory)
@@ -26,7 +26,7 @@ def plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the page report.html of a result; print its path.  Collective."""
+    """Write report.html, the page of a stored result; print its path.  Collective."""
     from feti_homog.report import page
 
     directory = output_folder.result_folder(arguments.directory)
@@ -37,7 +37,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the states of a result to VTK files; print their paths.  Collective."""
+    """Write the states in result.h5 to VTK files; print their paths.  Collective."""
     from feti_homog.results import viewed_states
 
     directory = output_folder.result_folder(arguments.directory)
@@ -58,7 +58,7 @@ def export(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print or write the fibre table of a case, result or image; `--out` adds a picture of the image.  Collective."""
+    """Print the fibre table of a case, result or image; with `--out` write it, and draw the image.  Collective."""
     from feti_homog.commands import listed_fibres, micrograph
 
     if arguments.image is None:

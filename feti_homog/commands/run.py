@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Run the case file in the arguments.  Collective.  Raises CaseError for `--resume` without a path."""
+    """Run a case file, and write its results.  Collective.  Raises CaseError for `--resume` without a path."""
     from feti_homog.analysis import runner
     from feti_homog.results import output_folder
 
@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the description of a case, or of a study and its first case.  Collective."""
+    """Print the description of a case, or of a study (sweep, fit, scatter) and its first case.  Collective."""
     from feti_homog.studies import case_runs, fit_file, uncertainty
 
     document = mpi_errors.on_root(comm, toml_files.read_document, arguments.case)  # once: it may be a pipe
@@ -37,7 +37,7 @@ def check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Print the reference of all keys, or of entries that contain the phrase `word`.  Collective."""
+    """Print the reference of all keys, or of entries that contain the words in the arguments.  Collective."""
     from feti_homog.case import reference
     from feti_homog.studies import outputs
 

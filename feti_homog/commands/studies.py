@@ -11,7 +11,7 @@ from feti_homog.typing import Intracomm
 
 
 def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """List the sweep cases, or run all cases or a single case.  Collective.  Raises CaseError if `--out` is missing."""
+    """List the cases of a sweep, or run all or one.  Collective.  Raises CaseError for a run without `--out`."""
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     cases = mpi_errors.on_root(comm, sweep_cases.load, arguments.case)
@@ -27,7 +27,7 @@ def sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Write the tables and, unless `no_pictures`, the picture of a sweep; print a summary.  Collective."""
+    """Write the tables of a sweep and, unless `no_pictures`, its picture; print a summary.  Collective."""
     from feti_homog.studies import collect as tables
 
     for line in mpi_errors.on_root_only(comm, tables.collect, arguments.directory, not arguments.no_pictures) or []:
@@ -35,13 +35,13 @@ def collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Fit the unknowns of a file to measured values.  Collective."""
+    """Fit the unknowns in a fit file to measured values, and print the estimates.  Collective."""
     study = mpi_errors.on_root(comm, fit_file.load, arguments.case)
     study.run(arguments.out, comm, arguments.ranks_per_case, arguments.retry, arguments.quiet)
 
 
 def uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    """Compute the scatter of results that uncertain numbers cause.  Collective."""
+    """Compute and print the scatter of results that the uncertain numbers of a case cause.  Collective."""
     from feti_homog.studies import uncertainty as scatter
 
     study = mpi_errors.on_root(comm, scatter.load, arguments.case)

@@ -10,7 +10,7 @@ from feti_homog.system.runtime import standard_streams
 
 
 def verify(words: Sequence[str]) -> int:
-    """Verify the result that the command-line `words` name; return the exit code.  The first rank prints."""
+    """Verify the result that the command-line `words` name; return the exit code.  Only the first rank prints."""
     standard_streams.prepare()
     standard_streams.end_on_signals()
     prints = standard_streams.launched_rank() == 0

@@ -1,4 +1,4 @@
-"""Write result files completely or not at all: `result.json`, `result.h5`, `result.xdmf`, tables, checkpoints.
+"""Write, check and read result files: `result.json`, `result.h5`, `result.xdmf`, tables, checkpoints; find landmarks.
 
 Imports `case`, `fem`, `homogenization`, `materials`, `schema`, `system` and `verify`.  Main entries:
 `field_file.FieldFile`, `result_json.write`, `viewed_states.read_state`.

@@ -17,8 +17,8 @@ from feti_homog.system.runtime import file_locks
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Replace the file `path` by the output of `write`, in one step; return `path`.
 
-    `write` gets the name of an unfinished file in the same folder.  After any exception the unfinished file is removed.
-    Raises FetiHomogError if the file cannot be written; an earlier file at `path` is untouched.
+    `write` gets the name of an unfinished file in the same folder.  After any exception this file is removed, and an
+    earlier file at `path` is untouched.  Raises FetiHomogError if the file cannot be written.
     """
     part = part_of(path)
     with file_errors("write", path):
@@ -41,7 +41,7 @@ def replace_text(path: Path, text: str) -> Path:
 
 
 def part_of(path: Path) -> Path:
-    """Return a name for the unfinished file of `path`, unique to this process."""
+    """Return a name for the unfinished file that becomes `path`; no other process uses the name."""
     return path.with_name(f"{path.name}.{file_locks.tag()}.part")
 
 
@@ -52,11 +52,11 @@ def commit(part: Path, path: Path) -> None:
 
 
 def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
-    """Write `content` at position `start` of a file; drop all former bytes from there on.
+    """Write `content` at byte `start` of a file, and drop all former bytes from there on.
 
-    At position 0 the function creates the file and its folder.  With `lasts`, it waits until the bytes are on the
-    disk.  A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises
-    FetiHomogError if the file cannot be written.
+    At position 0 the function creates the file and its folder.  With `lasts`, it waits until the bytes are on the disk.
+    A killed writer leaves unfinished bytes at the file end, which a reader must recognize.  Raises FetiHomogError if
+    the file cannot be written.
     """
     with file_errors("write", path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -77,9 +77,9 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
-    """Remove unfinished files with names that match `names` in a folder, as far as possible.
+    """Remove unfinished files from a folder, as far as possible, if their final names match `names`.
 
-    Unless this process writes there `alone`, files of running writers stay.
+    If `alone` is False, other processes may write there, and files of running writers stay.
     """
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
@@ -92,7 +92,7 @@ def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) 
 def file_errors(verb: str, path: Path) -> Iterator[None]:
     """Context manager: turn OSError, and RuntimeError of HDF5, into FetiHomogError "cannot VERB PATH: REASON".
 
-    Where HDF5 gives no reason, the reason is a lack of space if the disk is full.
+    If a write fails without a system message, and the disk is full, the reason is "No space left on device".
     """
     try:
         yield

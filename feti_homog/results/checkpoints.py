@@ -1,7 +1,7 @@
 """Store the events of a path as checkpoints, in one file or in memory.
 
-An event holds load, bond states and scalars.  While there is room, the event also holds multipliers and jumps; without
-them, a resumed run computes the equilibrium of the event again.
+An event holds the load, bond states and scalars of a path point.  While there is room, the event also holds multipliers
+and jumps; without them, a resumed run computes the equilibrium of the event again.
 
 The file is `checkpoint/events` in the result folder.  A line with the format comes first, then records.  A record is a
 prefix (content length, CRC-32 of the content, CRC-32 of both numbers) and its content.  The first record holds the
@@ -44,9 +44,9 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def room_of(case: Case) -> int | None:
-    """Return the size limit in bytes for events with multipliers.
+    """Return the total size of events, in bytes, above which further events have no multipliers.
 
-    The limit is None, for no limit, if all fields are kept, or with friction, where one load has many equilibria.
+    Returns None, for no limit, if all fields are kept, or with friction, where one load has many equilibria.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
@@ -67,7 +67,7 @@ class EventsInMemory:
         self._events, self._bytes = [], 0
 
     def count(self) -> int:
-        """Return the number of events.  `Checkpoint` raises CaseError if its file is damaged, or of another run."""
+        """Return the number of stored events.  A `Checkpoint` raises CaseError for a damaged or foreign file."""
         return len(self._events)
 
     def read(self, number: int) -> Arrays:
@@ -89,13 +89,13 @@ class EventsInMemory:
         self._bytes += len(self._events[number])
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return an event to store, without multipliers and jumps if `size` bytes of stored events fill the room."""
+        """Return an event as stored: without multipliers and jumps if earlier events, `size` bytes, fill the room."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
 
 class Checkpoint(EventsInMemory):
-    """A store of events in the file `directory`/checkpoint/events, which rank 0 writes.
+    """A store of events in the file `directory`/checkpoint/events, which rank 0 reads and writes.
 
     Attributes:
         path: path of the file.
@@ -176,8 +176,8 @@ def record(content: bytes) -> bytes:
 def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
     """Yield the end position and the content of each complete record in an event file.
 
-    Reading begins at the first record, or at `start`, the end position of a record.  Raises CaseError if the file is
-    unreadable or damaged, or has another format.
+    The iteration begins with the first record, or after `start`, the end position of a record.  Raises CaseError if the
+    file is unreadable or damaged, or has another format.
     """
     try:
         with path.open("rb") as stream:
@@ -210,7 +210,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def packed(event: Arrays) -> bytes:
-    """Compress an event into the content of a record."""
+    """Serialize and compress an event into the content of a record."""
     layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
     content = b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())])
     compressor = zlib.compressobj(1, strategy=zlib.Z_RLE)  # digits of multipliers have no repetitions to look for
@@ -218,7 +218,7 @@ def packed(event: Arrays) -> bytes:
 
 
 def unpacked(content: bytes) -> Arrays:
-    """Decompress the content of a record into an event.  Raises CaseError if it is damaged or too large."""
+    """Restore an event from the content of a record.  Raises CaseError for a damaged or unreasonably large event."""
     try:
         data = zlib.decompressobj().decompress(content, max(8 * WHOLE_BYTES, 16 * len(content)))
         event, start = Arrays(), data.index(b"\n", 0, 1 << 16) + 1
@@ -233,8 +233,8 @@ def unpacked(content: bytes) -> Arrays:
 def refuse_others(directory: Path) -> None:
     """Check that the checkpoint folders in `directory` are missing, or contain only events.  Call on one rank.
 
-    Raises CaseError if a file or a link has such a name, or a folder has files other than events; OSError if a folder
-    cannot be read.
+    Raises CaseError if a file or a link has the name of such a folder, or a folder has files other than events; OSError
+    if a folder cannot be read.
     """
     for folder in (directory / FOLDER, directory / DROPPED):
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
@@ -247,10 +247,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Rename the checkpoint folder, then remove it, so that no run finds a part of it.  Call on one rank.
-
-    Raises FetiHomogError if the folder cannot be renamed.
-    """
+    """Remove the checkpoint, renamed before, so that no run finds a part.  On one rank.  Raises FetiHomogError."""
     folder, dropped = directory / FOLDER, directory / DROPPED
     _remove_events(dropped)
     if folder.is_dir():
@@ -260,7 +257,7 @@ def remove(directory: Path) -> None:
 
 
 def _remove_events(folder: Path) -> None:
-    """Remove the event file and its folder as far as possible.  The next run removes the rest."""
+    """Remove the event file and its `folder`.  Errors are ignored: the next run removes the rest."""
     with contextlib.suppress(OSError):
         (folder / NAME).unlink(missing_ok=True)
         folder.rmdir()

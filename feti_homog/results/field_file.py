@@ -30,7 +30,7 @@ RESERVE = 1 << 17  # bytes of disk space for the headers that HDF5 adds
 
 @dataclass(frozen=True)
 class _Rows:
-    """The range of this rank's rows in a shared table; the table has all ranks' rows in rank order."""
+    """This rank's rows in a table that all ranks share: `count` from row `start` on, of `total` rows in rank order."""
 
     start: int
     count: int
@@ -47,8 +47,8 @@ class FieldFile:
 
     `field_layout` lists tables, attributes and views of tables.  An array without rows has shape (0, ...).
 
-    Until `close` the file has the name `part`. A `with` block closes the file at its end. A FetiHomogError on all ranks
-    removes the file; any other exception in the block leaves the file unfinished.
+    Until `close` the file has the name `part`.  A `with` block closes the file at its end.  A FetiHomogError on all
+    ranks removes the file; any other exception in the block leaves the file unfinished.
 
     Raises:
         FetiHomogError: the file cannot be written; raised on every rank, after the unfinished file is removed.
@@ -90,17 +90,17 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: field_layout.StatePart) -> None:
-        """Add state `number` (0, 1, ...) and flush the file.  Attributes must be equal on all ranks."""
+        """Write state `number` (0, 1, ...) and flush the file.  Attributes must be equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))
         self._agreed(mpi_errors.agree_after, self._file.flush)
 
     def close(self) -> Path:
-        """Complete the file, give it its final name, and return its path."""
+        """Complete the file with its views, give it its final name, and return its path."""
 
         def complete() -> None:
-            """Add views and rename the file.  Call on one rank: on all ranks, views would cost as much as tables."""
+            """Add views, and rename the file.  Call on one rank: on all ranks, views would cost as much as tables."""
             # No lock: only this process has the file open, and some file systems have no locks.
             with h5py.File(self.part, "r", locking=False) as file:
                 size = (1 << 12) * (1 + len(field_layout.views_of(file)))  # measured: 0.9 KB for each view on average
@@ -129,7 +129,7 @@ class FieldFile:
             self._remove()
 
     def _bytes(self, part: Any) -> int:
-        """Return an upper bound (bytes) for a part's tables and their headers, over all ranks."""
+        """Return an upper bound, in bytes, for the tables of a part and their HDF5 headers, over all ranks."""
         size = 0
         for name, description in field_layout.tables(part).items():
             row_bytes = np.dtype(description.dtype).itemsize * int(np.prod(np.shape(getattr(part, name))[1:]))
@@ -138,7 +138,7 @@ class FieldFile:
         return size
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Write the tables of a group; each rank writes its own rows.  Raises ValueError for a wrong number of rows."""
+        """Write the tables of a part to a group, each rank its rows.  Raises ValueError for a wrong number of rows."""
         size = self._bytes(part)
         self._agreed(mpi_errors.on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
@@ -159,9 +159,9 @@ class FieldFile:
             self._agreed(mpi_errors.agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
-        """Call a function, and agree on its errors by the collective call `agreed`.
+        """Call function(*args) through `agreed`, a collective function of `mpi_errors`; return its result.
 
-        Returns the function's result.  After a FetiHomogError of any rank, all ranks remove the file and raise.
+        After a FetiHomogError on any rank, all ranks remove the file and raise.
         """
         try:
             return agreed(self._comm, _with_write_errors, self.path, function, *args)
@@ -170,7 +170,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Truncate, close and remove the file.  On a full disk HDF5 closes only empty files.  Collective."""
+        """Truncate, close and remove the file: on a full disk HDF5 closes only empty files.  Collective."""
         self._is_open = False
         file_locks.files.discard(self.part)
         if self._comm.rank == 0:
@@ -185,15 +185,15 @@ class FieldFile:
 
 
 def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """Return function(*args); its write errors become FetiHomogError about `path`."""
+    """Return function(*args).  An OSError, or RuntimeError of HDF5, becomes a FetiHomogError about `path`."""
     with atomic.file_errors("write", path):
         return function(*args)
 
 
 def _create(part: Path, size: int) -> None:
-    """Create an empty HDF5 file and reserve `size` bytes for it.  Raises OSError, after it removes the file.
+    """Create the HDF5 file `part` without content, and reserve `size` bytes for it.
 
-    The function uses plain system calls, since HDF5 may crash or hang if they fail.
+    It makes system calls without HDF5, which may crash or hang if they fail.  Raises OSError; the file is then removed.
     """
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -214,13 +214,13 @@ def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Reserve `size` bytes from `start` on for a file.  Without space, MPI-IO may wait forever.  Raises OSError."""
+    """Reserve `size` bytes of a file from `start` on: without space, MPI-IO may wait forever.  Raises OSError."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: Mapping[str, str]) -> None:
-    """Create a table and write this rank's rows.  A rank without rows selects none.  Collective."""
+    """Create the table `name`, and write this rank's rows; a rank without rows takes part.  Collective."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
     _set_attributes(file, name, texts)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
@@ -236,7 +236,7 @@ def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: M
 
 
 def add_views(file: Any) -> None:
-    """Add all views to an open file with complete tables; empty tables have no views."""
+    """Add all views of `field_layout` to an open file whose tables are complete; empty tables get no views."""
     for group, view in field_layout.views_of(file):
         original = file[f"{group}/{view.source}"]
         shape = (len(original), view.components) if view.components else (len(original),)

@@ -28,9 +28,9 @@ MAY_BE_NAN = ("centre", "radius", "stress_33", "mesh_error")
 def require_own(path: Path, state: int | None = None) -> None:
     """Check result.h5 in a child process, because HDF5 may crash on damaged files.
 
-    The check refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than
-    the file or outside it; other layouts; a damaged mesh or case; numbers outside RANGES, in all states or in one
-    `state`.  Raises CaseError for these faults, a missing file or a failed child, FetiHomogError without permission.
+    It refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than the file
+    or outside it; other layouts; a damaged mesh or case; numbers outside RANGES, in all states or in one `state`.
+    Raises CaseError for these faults, a missing file or a failed child, FetiHomogError without read permission.
     """
     if not path.is_file():
         has_events = (path.parent / "checkpoint/events").is_file()
@@ -40,7 +40,7 @@ def require_own(path: Path, state: int | None = None) -> None:
 
 
 def require_tables(path: Path, state: int | None) -> None:
-    """Check links, sizes, layout and numbers of result.h5 in this process; arguments and errors as in `require_own`."""
+    """Check result.h5 in this process.  Arguments, refused content and errors are as in `require_own`."""
     room = {"views": 64 * path.stat().st_size, "tables": path.stat().st_size}  # bytes that may follow
     try:
         with h5py.File(path, "r", locking=False) as file:
@@ -71,7 +71,7 @@ def require_tables(path: Path, state: int | None) -> None:
 
 
 def _require_layout(path: Path, file: Any, state: int | None) -> None:
-    """Refuse tables and attributes unlike `field_layout`, and numbers outside RANGES.  Raises as `require_own` does."""
+    """Refuse tables and attributes unlike `field_layout`, and numbers outside RANGES; `state` as in `require_own`."""
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
     counts = {symbol: entry.shape[0] if entry.shape else 0 for symbol, entry in entries.items()}
@@ -104,7 +104,7 @@ def _blocks(table: Any) -> Iterator[Any]:
 
 
 def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any) -> None:
-    """Compare a table or attribute with RANGES, a block of rows at a time.  Raises CaseError."""
+    """Compare the numbers `name` of a table or attribute with RANGES.  Raises CaseError, which begins with `place`."""
     low, high = RANGES.get(name, (-1e100, 1e100))  # as in case files
     if isinstance(high, str):  # fibres count from 1, all others from 0
         high = counts[high] if high == "f" else counts[high] - 1
@@ -116,7 +116,7 @@ def _require_values(place: str, name: str, counts: Mapping[str, int], table: Any
 
 
 def _require_mesh(path: Path, file: Any) -> None:
-    """Check case, element areas, fibres, interface nodes, and names of phases and states.  Raises CaseError."""
+    """Check the case, element areas, fibres, interface nodes, and names of phases and states.  Raises CaseError."""
     try:
         cases.check_stored(case := result_json.loads(file.attrs["case"]))
     except (CaseError, ValueError) as error:

@@ -1,9 +1,9 @@
 """Define the layout of result.h5: the parts that ranks write, their paths in the file, and views for viewers.
 
 Lengths have the unit of the cell, stresses the unit of the moduli.  The file has n nodes, m elements, k interface nodes
-and f fibres, distributed over the ranks.  Nodes are torn: each body in each subdomain has its own nodes.  Views are
-vectors with three components, tensors and single columns.  They are virtual and nearly free: HDF5 fills them from other
-datasets when a viewer reads them.
+and f fibres, distributed over the ranks.  Nodes are torn: each body in each subdomain has its own nodes.  Views show
+tables as vectors with three components, tensors or single columns.  They are virtual and take almost no space: HDF5
+fills them from other datasets when a viewer reads them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ GROUP_OF_STATES = "state/K"
 
 @dataclass(frozen=True)
 class Header:
-    """The attributes of the file."""
+    """The attributes of result.h5: case, program version, cell, mesh and units."""
 
     title: str = described("name of the case")
     version: str = described("version of the program")
@@ -39,7 +39,7 @@ class Header:
 class MeshPart:
     """This rank's n nodes and m triangles, one subdomain after the other.
 
-    Nodes are torn between subdomains and bodies.  Each 4**refine consecutive triangles fill one coarse triangle.
+    Nodes are torn between subdomains and bodies.  The 4**refine triangles of each coarse triangle are consecutive.
     """
 
     points: Float = described("positions of the nodes", records.LENGTH, "(n, 2)")
@@ -78,7 +78,7 @@ class FibrePart:
 
 @dataclass(frozen=True)
 class InterfacePart:
-    """The k fibre-matrix interface nodes with multipliers on this rank; k may be 0."""
+    """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
 
     points: Float = described("positions of the interface nodes", records.LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
@@ -97,7 +97,7 @@ class InterfacePart:
 
 @dataclass(frozen=True, repr=False)
 class StatePart:
-    """One cell state and this rank's part of its fields."""
+    """The strains, stresses and labels of one state, and this rank's part of its fields."""
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
     stress_mean: Float = described(f"mean stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress")
@@ -149,17 +149,17 @@ class StatePart:
 
 
 def tables(part: Any) -> dict[str, records.Description]:
-    """Return descriptions of the fields with rows, which become datasets, by name."""
+    """Return descriptions, by name, of the fields of `part` that have rows; they become datasets."""
     return {name: d for name, d in records.descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return values of the fields without rows, which become attributes, by name."""
+    """Return the values, by attribute name, of the fields of `part` that have no rows; they become attributes."""
     return {d.name or name: getattr(part, name) for name, d in records.descriptions(part).items() if not rows_of(d)}
 
 
 def rows_of(description: records.Description) -> str:
-    """Return the row kind of a dataset: `n`, `m`, `k` or `f`, as in the module.  It is empty for attributes."""
+    """Return the letter for the row count of a dataset (n, m, k or f, see the module); "" for attributes."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 
@@ -188,7 +188,7 @@ class SpatialStatePart(StatePart):
 
 @dataclass(frozen=True)
 class View:
-    """A virtual dataset /`kind`/GROUP/`name` over datasets of /GROUP.
+    """A virtual dataset /`kind`/GROUP/`name`, filled from datasets of /GROUP.
 
     Attributes:
         components: column count; 0 for a dataset with one dimension.
@@ -205,7 +205,7 @@ class View:
     meaning: str
 
     def path(self, group: str) -> str:
-        """Return the path of the view in the file."""
+        """Return the path of the view in the file; `group` is the path of its datasets, such as state/0."""
         return f"{self.kind}/{group}/{self.name}"
 
 
@@ -216,7 +216,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _stress_tensor(axial: Sequence[str] = ()) -> View:
-    """Return the view of the stress tensor, with the stresses `axial`, too.  Components without a stress are 0."""
+    """Return the view of the stress tensor; `axial` names shears along x3, which are 0 if it is empty."""
     entries: dict[str, tuple[str, int | None]] = {"33": ("stress_33", None)}
     entries |= {name[1:]: ("stress", column) for column, name in enumerate(voigt.STRESSES)}
     entries |= {name[1:]: ("axial_stress", column) for column, name in enumerate(axial)}
@@ -252,7 +252,7 @@ SPATIAL_VIEWS: tuple[View, ...] = (
 
 
 def views_of(file: Any) -> list[tuple[str, View]]:
-    """Return group and view for each view with existing, non-empty tables in an open file."""
+    """Return pairs of group and view for all views of an open file whose tables exist and have rows."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]

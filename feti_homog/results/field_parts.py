@@ -16,7 +16,7 @@ from feti_homog.typing import Float
 
 
 def header(cell: unit_cell.TornCell) -> Header:
-    """Return the file attributes of a cell."""
+    """Return the attributes of result.h5 for a cell."""
     case, plan = cell.case, cell.summary
     return Header(
         title=case.name,
@@ -34,7 +34,7 @@ def header(cell: unit_cell.TornCell) -> Header:
 
 
 def mesh_part(cell: unit_cell.TornCell) -> MeshPart:
-    """Concatenate the refined meshes of this rank's subdomains; nodes are numbered from 0 on each rank."""
+    """Concatenate the refined meshes of this rank's one-body parts; nodes are numbered from 0 on each rank."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -91,10 +91,10 @@ def state_parts(
     point: int,
     fields: recovered_fields.RecoveredFields,
 ) -> Iterator[StatePart]:
-    """Yield the part of each state, from its responses and the recovered `fields`.  Collective.
+    """Yield this rank's part of each state, from its responses and the recovered `fields`.  Collective.
 
-    `states` maps labels to responses: in the plane problem and, if there is one, in the axial problem; conduction takes
-    the place of the axial problem.  A problem without a response (None) has zero fields; a state has at least one
+    `states` maps labels to the responses in the plane problem and, if there is one, in the axial problem; conduction
+    takes the place of the axial problem.  A problem without a response (None) has zero fields; a state has at least one
     response.  `load_factor` and `point` are as in `StatePart`.
     """
     axial_cell = cell.axial or cell
@@ -139,7 +139,7 @@ def _at_nodes(
     in_plane: recovered_fields.NodalFields,
     along: recovered_fields.NodalFields | None = None,
 ) -> dict[str, Any]:
-    """Return displacements, and the fields at interface nodes, by their dataset names; without `along`, u_3 = 0.
+    """Return displacements, and fields at interface nodes, by dataset name; without `along`, 0 along x3.
 
     If subdomains extend across materials, all interface nodes are bonded.
     """
@@ -163,7 +163,7 @@ def _at_nodes(
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:
-    """Rotate normal and tangential components (k, 2) into components along x and y (k, 2)."""
+    """Rotate normal and tangential components `pairs` (k, 2) into components (k, 2) along x1 and x2."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
 

@@ -1,8 +1,8 @@
-"""Find the path landmarks, and choose the points to store and to show.
+"""Find the landmarks of a path, and choose the points to store and to show.
 
 Landmarks are first softening, first break, peak, valley after the peak, and end.  The peak is the largest stress before
-a fall, in the component with the largest strain. Points are entries of `path` in result.json. When a path ends, fields
-are kept at both ends, at points around drops, and at evenly spaced points in between.
+a fall, in the component with the largest strain.  Points are entries of `path` in result.json.  When a path ends,
+fields are kept at its first and last point, at points around drops, and at evenly spaced points in between.
 """
 
 from collections.abc import Collection, Sequence
@@ -27,7 +27,8 @@ PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 def turning_points(values: Float, threshold: float) -> list[int]:
     """Return the alternating peaks and valleys of a curve (n,), as point numbers.
 
-    Successive turning points, which may be ends of the curve, differ by more than `threshold`; flat curves have none.
+    Values at successive turning points, which may be ends of the curve, differ by more than `threshold`.  A curve whose
+    values differ less has none.
     """
     entries, low, high = list[int](), 0, 0  # low, high: extremes since the last turning point
     rises = falls = True  # the curve may begin with either
@@ -44,10 +45,10 @@ def turning_points(values: Float, threshold: float) -> list[int]:
 
 
 def deepest_fall(size: Float, share: float | None, broken: Float) -> tuple[int, int | None]:
-    """Return the numbers of the top and the valley of the deepest fall below all values (n,) before it.
+    """Return the numbers of the top and the valley of the deepest fall of a curve `size` (n,).
 
-    A fall counts if `broken` (n,) increases in it, and if it takes `share` of its top, or begins at the largest value.
-    Without such a fall by more than `LEAST_DROP` of the largest value, returns (n, None).
+    A fall counts if bonds break in it (their number `broken` (n,) rises), and it begins at the largest value or takes
+    the fraction `share` (None: never) of its top.  Returns (n, None) if none exceeds `LEAST_DROP` of the largest value.
     """
     top = np.maximum.accumulate(np.where(size >= np.maximum.accumulate(size), np.arange(len(size)), 0))
     fall = np.where(broken > broken[top], size[top] - size, 0.0)
@@ -60,13 +61,13 @@ def deepest_fall(size: Float, share: float | None, broken: Float) -> tuple[int, 
 
 
 def peak_of(document: path_curves.Document) -> dict[str, Any]:
-    """Return the fields of `result_records.Peak` for a non-empty path; there is no peak if no stress acts.
+    """Return the entries of `result_records.Peak` for a non-empty path; no stress, strain or event if no stress acts.
 
     The peak is the largest stress from the leg with the first damage under stress to the deepest fall in which bonds
     break or, without such a fall, to the end of the first leg with breaks: after all fibres debond, the matrix alone
-    may carry more.  If a fall is less than `LEAST_FALL`, the path unfinished, or bonds broke earlier without stress,
-    only a fall from the largest stress counts.  The entry `so_far` marks a path that is unfinished, or stopped early
-    without a fall.
+    may carry more.  A fall by less than `LEAST_FALL` counts only from the largest stress; so does every fall of an
+    unfinished path, and of a path whose bonds broke earlier without stress.  The entry `so_far` marks a path that is
+    unfinished, or stopped early without a fall.
 
     On the first leg of a path of events the load only rises: where bonds break, the cell drops to the next stable
     branch.
@@ -116,16 +117,16 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
 
 
 def bond_of(peak: path_curves.Document, title: str = "") -> str:
-    """Describe the bond of a landmark by fibre and direction, or "" if unknown; `title` begins its keys in `peak`."""
+    """Describe a landmark's bond by fibre and direction, "" if unknown; its keys in `peak` begin with `title`."""
     if peak.get(f"{title}fibre") is None:
         return ""
     return f"fibre {peak[f'{title}fibre']} at {round(peak[f'{title}angle'], 3) + 0.0:.4g} degrees"
 
 
 def name_of(document: path_curves.Document, peak: path_curves.Document) -> str:
-    """Name the largest stress: SO_FAR if `peak` has an entry `so_far`, PEAK before a fall, else LARGEST.
+    """Name the largest stress: SO_FAR if `peak` has `so_far`, PEAK before a fall by LEAST_FALL, else LARGEST.
 
-    A fall takes at least `LEAST_FALL` of the stress, to the valley or to the end of the leg.
+    The stress falls to the valley or to the end of the leg.
     """
     if "so_far" in peak:
         return SO_FAR
@@ -182,12 +183,13 @@ Drop = tuple[float, int, int]
 
 
 def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
-    """Return the numbers of the points to store with fields, in ascending order.
+    """Choose the points to store with fields; return their numbers in ascending order.
 
     Args:
         states: "all"; "peaks": ends, `marked` points and points around every drop; or a number of points: the ends, the
             marked points if they all fit, points around the deepest drops (up to half the rest), evenly spaced points.
         legs: number of legs of an event path, which passes all equilibria on the first leg; 0 for increments.
+        marked: numbers of points at landmarks.
     """
     if not points or states == "all" or (isinstance(states, int) and len(points) <= states):
         return list(range(len(points)))
@@ -209,11 +211,11 @@ def kept(points: Sequence[path_curves.Point], states: int | str, legs: int, mark
 
 
 def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
-    """Return stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress or strain.
+    """List stress drops, and strain jumps at one load, above LEAST_DROP of the largest stress or strain.
 
     A drop leads from a peak to the next valley.  On the first of `legs` legs (see `kept`), a drop also leads from each
-    load at which bonds break to the next point that a rising load reaches.  Elsewhere, a jump leads across all points
-    at one load.
+    load at which bonds break to the next point that a rising load reaches.  On later legs, and on paths of increments,
+    a jump leads across all points at one load.
     """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size = _norm(stress, 2.0)
@@ -239,7 +241,7 @@ def drops(points: Sequence[path_curves.Point], legs: int) -> list[Drop]:
 
 
 def _norm(values: Float, shear: float) -> Float:
-    """Return the norms (n,) of tensors (n, 3) or (n, 6); squared shears have weight `shear`."""
+    """Return the norms (n,) of strains or stresses (n, 3) or (n, 6), with weight `shear` for squared shears."""
     tensions = 2 if values.shape[1] == len(voigt.STRAINS) else 3
     square = np.square(values)
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
@@ -248,8 +250,8 @@ def _norm(values: Float, shear: float) -> Float:
 def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
     """Choose at most `rows`, at least 2, points of the path, or of the points `among` (in ascending order).
 
-    The choice has the first and last point, then landmarks, deepest drop and leg ends, each group if it fits, and
-    further points at evenly spaced numbers of broken bonds.
+    Returns point numbers: the first and last point; then landmarks, the points of the deepest drop, and leg ends, each
+    group if it fits; then points at evenly spaced numbers of broken bonds.
     """
     points = document["path"]
     numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
@@ -268,14 +270,14 @@ def chosen(document: path_curves.Document, rows: int, among: Sequence[int] | Non
 
 
 def kept_points(document: path_curves.Document) -> list[int]:
-    """Return the points with stored fields, in state order.  If no fields are stored, return all points."""
+    """Return the point number of each state with stored fields; all point numbers if no fields are stored."""
     return list(document.get("states") or range(len(document["path"])))
 
 
 def landmark_states(document: path_curves.Document, rows: int, count: int) -> list[int]:
-    """Return the states at landmarks, among the first `count` states.
+    """Return the numbers of the states at landmarks, among the first `count` states.
 
-    With fewer than three such states, return at most `rows` states from `chosen_states`.
+    If fewer than three landmarks have states, returns at most `rows` states by `chosen_states` instead.
     """
     among, marked = kept_points(document)[:count], marks(document)
     entries = [state for state, point in enumerate(among) if point in marked]
@@ -283,6 +285,6 @@ def landmark_states(document: path_curves.Document, rows: int, count: int) -> li
 
 
 def chosen_states(document: path_curves.Document, rows: int, count: int) -> list[int]:
-    """Choose at most `rows` states among the first `count`, as `chosen` does for points."""
+    """Return the numbers of at most `rows` of the first `count` states, whose points `chosen` selects."""
     among = kept_points(document)[:count]
     return [among.index(number) for number in chosen(document, rows, among)]

@@ -1,4 +1,4 @@
-"""Lock and check the result folder.
+"""Lock the result folder, and check its files.
 
 One run at a time writes to the folder, and replaces no foreign file.  A run recognizes result files by content, not by
 a marker in the folder: a user may later add a foreign file with such a name.
@@ -41,9 +41,9 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def usable(directory: Path) -> None:
-    """Check that a run can use the folder `directory`; nothing is created.
+    """Check that a run can use the folder `directory`, without creating it.
 
-    The folder, or the folder in which it will lie, must be writable, and no other run may use it.  Raises CaseError.
+    The folder, or its nearest existing parent, must be writable, and no other run may use it.  Raises CaseError.
     """
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
@@ -118,13 +118,13 @@ def replaced(directory: Path, case: Case) -> str:
 
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
-    """Return the error for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
+    """Construct the CaseError for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
     fault = f"no {kind} of this program wrote {name}, and this one would replace it"
     return CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 
 def _is_own(path: Path) -> bool:
-    """Return whether any version of the program wrote result.json, result.h5 or events.log; True for other files."""
+    """Return whether some version of the program wrote result.json, result.h5 or events.log; True for other names."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(input_files.read(path))
@@ -139,11 +139,11 @@ def _is_own(path: Path) -> bool:
 
 
 def latest(directory: Path) -> dict[str, Any]:
-    """Return the document of result.json or of the checkpoint.  Call on one rank.
+    """Return the document of result.json or, for an unfinished path, of the checkpoint.  Call on one rank.
 
-    The checkpoint counts if it has more points, or result.json is missing or of another case; then `unfinished` and
-    `status` give the number of points and the load.  Raises CaseError for a missing or damaged file, or unreadable
-    events, FetiHomogError for an unreadable result.json.
+    The checkpoint counts if it has more points, or result.json is missing or of another case; then the entries
+    `unfinished` and `status` give the number of points and the load.  Raises CaseError for a missing or damaged file,
+    or unreadable events, FetiHomogError for a result.json without read permission.
     """
     from feti_homog.results import checkpoints  # only paths have checkpoints
 
@@ -199,15 +199,13 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     """Context manager: create the result folder, and lock the folder during a block.  Collective.
 
     Removes unfinished files from earlier runs, and at the end new folders that stayed empty.  On a file system without
-    locks, `say` gets a warning and the run continues without a lock.
-
-    Raises CaseError if the folder cannot be made, or another run has locked it; FetiHomogError if the lock file cannot
-    be created or locked.
+    locks, `say` gets a warning and the run continues without a lock.  Raises CaseError if the folder cannot be made, or
+    another run has locked it; FetiHomogError if the lock file cannot be created or locked.
     """
     lock = file_locks.Lock(directory / LOCK)
 
     def hold() -> tuple[list[Path], str]:
-        """Create and lock the folder.  Returns new folders, innermost first, and a warning or an empty string."""
+        """Create and lock the folder.  Returns a list of new folders, innermost first, and a warning or ""."""
         made = [path for path in (directory, *directory.parents) if not path.exists()]
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -241,9 +239,9 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove, if possible, result files not in `written`, and events if no log is written.  Call on one rank.
+    """Remove result files that are not in `written`; without the event log in it, also events.  Call on one rank.
 
-    Raises FetiHomogError if the checkpoint folder cannot be removed.
+    Files that cannot be removed stay.  Raises FetiHomogError if the checkpoint folder cannot be removed.
     """
     if result_json.LOG not in written and (directory / "checkpoint").is_dir():
         from feti_homog.results import checkpoints  # only paths have checkpoints
@@ -278,7 +276,7 @@ def write_product(path: Path, text: str) -> Path:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Remove nested folders, innermost first, up to the first non-empty folder."""
+    """Remove nested folders, listed innermost first, up to the first that is not empty."""
     with contextlib.suppress(OSError):
         for folder in folders:
             folder.rmdir()

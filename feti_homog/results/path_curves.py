@@ -23,26 +23,26 @@ Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """Return the case's waypoints, or its single load, with all components by name."""
+    """Return the waypoints of a path, or the single load of analysis `load`, with all components by name."""
     return load_sections.completed(_given(document), document["case"]["analysis"]["plane"])
 
 
 def named_components(document: Document) -> list[int]:
-    """Return the indices of the components that the waypoints name, in Voigt order."""
+    """Return the indices of the components that some waypoint names, in Voigt order."""
     loads = _given(document)
     first = load_sections.first_named(loads, document["case"]["analysis"]["plane"])
     return [component for component, number in enumerate(first.values()) if number < len(loads)]
 
 
 def _given(document: Document) -> list[load_sections.Strain | load_sections.MixedLoad]:
-    """Return the loads of the case in `document`, without default components."""
+    """Return the loads of the case in `document` as its file gives them, without default components."""
     section = document["case"].get("path") or document["case"]["load"]
     as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
     return [load_sections.MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
 
 
 def changed_components(document: Document, leg: int | None = None) -> list[int]:
-    """Return the indices of the components that change at waypoint `leg`, from 1, or by default at any waypoint."""
+    """Return the indices of the components that change on leg number `leg`, from 1, or by default on any leg."""
     pairs, changed = voigt.plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for number, target in enumerate(targets(document), start=1):
@@ -55,13 +55,13 @@ def changed_components(document: Document, leg: int | None = None) -> list[int]:
 
 
 def stresses(document: Document) -> Float:
-    """Return the stresses (n, c) of the points, 0 where they are solver noise."""
+    """Return the stresses (n, c) of the points; stresses within the solver's noise become 0."""
     stress = np.array([point["stress"] for point in document["path"]], float)
     return np.where(np.abs(stress) > noise(document), stress, 0.0)
 
 
 def noise(document: Document) -> float:
-    """Return the solver's noise: `ZERO` times the larger of largest stress, and largest strain times least modulus."""
+    """Return the stress noise: `ZERO` times the largest stress or, if larger, largest strain times least modulus."""
     strain, stress = (np.abs([point[name] for point in document["path"]]).max() for name in ("strain", "stress"))
     named = [constant for phase in document["case"].get("material", {}).values() for constant in phase.items()]
     moduli = [np.max(value) for name, value in named if value and name.startswith(("young", "E", "G", "stiffness"))]
@@ -71,8 +71,8 @@ def noise(document: Document) -> float:
 def leading_component(document: Document) -> int:
     """Return the index of the component with the largest strain on the leg where damage begins under stress.
 
-    Without such a leg, the search includes all points.  It compares the components that the waypoints change there; if
-    only the temperature changes, it compares the stresses of all components, or the strains if no stress acts.
+    Without such a leg, all points count.  Candidates are the components that the waypoints change there.  If only the
+    temperature changes, returns the component with the largest stress or, if no stress acts, the largest strain.
     """
     leg, damaging = legs_of(document), damaging_leg(document, ("broke", "softened"))
     points = np.ones(len(leg), bool) if damaging is None else leg == damaging
@@ -84,7 +84,7 @@ def leading_component(document: Document) -> int:
 
 
 def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int | None:
-    """Return the first leg, from 1, with damage and stress, or None.
+    """Return the first leg, from 1, that has both damage and stress; None without one.
 
     A point has damage if one of the entries `counts`, such as `broke`, is positive.
     """
@@ -94,9 +94,9 @@ def damaging_leg(document: Document, counts: Sequence[str] = ("broke",)) -> int 
 
 
 def abscissa(document: Document) -> tuple[str, Float]:
-    """Return the name and values (n,) of the leading strain.
+    """Return the name and values (n,) of the quantity to plot stresses over: the leading strain.
 
-    If this strain is held at zero, or all waypoints change the temperature alone, return the temperature instead.
+    If this strain stays at zero, or all waypoints change the temperature alone, a nonzero temperature takes its place.
     """
     table, strains = table_of(document["path"]), voigt.voigt_names(len(document["path"][0]["strain"]))[0]
     leading, largest = strains[leading_component(document)], max(np.abs(table[strain]).max() for strain in strains)
@@ -106,14 +106,14 @@ def abscissa(document: Document) -> tuple[str, Float]:
 
 
 def temperature_of(document: Document, number: int) -> float | None:
-    """Return the temperature of point `number` on a leg that changes it alone, else None."""
+    """Return the temperature of point `number` on a leg that changes only the temperature; None elsewhere."""
     point = document["path"][number]
     is_alone = "temperature" in point and not changed_components(document, int(legs_of(document)[number]))
     return point["temperature"] if is_alone else None
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield leg, component with the largest strain change, and point of its largest stress, from leg 2 on."""
+    """Yield (leg, component with the largest strain change, point of its largest stress) from leg 2 on."""
     leg, stress = legs_of(document), stresses(document)
     strain = np.array([point["strain"] for point in document["path"]])
     for number in range(2, legs(document) + 1):
@@ -132,13 +132,13 @@ def legs_of(document: Document) -> Float:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Return the columns of `values` (n, c) with an entry above `share` times the largest.  Magnitudes are compared."""
+    """Return the columns of `values` (n, c) with a magnitude above `share` times the largest magnitude."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
 
 def shown_components(document: Document) -> list[str]:
-    """Return the names of the visible stresses on a path or, without stress, of the visible strains."""
+    """Name the stresses on a path that a plot shows (above FAINT times the largest); without stress, such strains."""
     strains, names = voigt.voigt_names(len(document["path"][0]["stress"]))
     if visible := components_above(FAINT, stresses(document)):
         return [names[component] for component in visible]
@@ -147,25 +147,25 @@ def shown_components(document: Document) -> list[str]:
 
 
 def what_rises(document: Document) -> str:
-    """Name the rising quantity on the first leg.  It is "strain" if only strains rise, else "load"."""
+    """Name the quantity that rises on the first leg: "strain" if it prescribes strains alone, else "load"."""
     first = targets(document)[0]
     other_loads = {*voigt.plane_state_of(document).stresses, load_sections.TEMPERATURE}
     return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
 
 
 def legs(document: Document) -> int:
-    """Return the number of straight legs of a path."""
+    """Return the number of straight legs of a path, one for each waypoint."""
     return len(document["case"]["path"].get("waypoints", [0]))
 
 
 def first_leg(document: Document) -> int:
-    """Return the number of points on the first leg, or of all points for increments."""
+    """Return the number of points on the first leg of an event path; of all points for increments."""
     by_events = document["case"]["path"]["method"] == "events"
     return int((legs_of(document) <= 1).sum()) if by_events else len(document["path"])
 
 
 def ends_of_legs(document: Document) -> list[int]:
-    """Return the number of the last point at each waypoint that the path reaches."""
+    """Return the number of the last point at each waypoint; waypoints that the path does not reach are left out."""
     count = legs(document)
     position = count * np.array([point["load_factor"] for point in document["path"]])
     at_ends = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
@@ -173,7 +173,7 @@ def ends_of_legs(document: Document) -> list[int]:
 
 
 def is_proportional(document: Document) -> bool:
-    """Return whether every branch is a ray from zero: a path of events with one leg."""
+    """Return whether the response between breaks is always a ray from zero: on an event path with one leg."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
@@ -185,9 +185,10 @@ def breaks(point: Point) -> bool:
 def later_corners(document: Document) -> list[Point]:
     """Return the points of an event path beyond the first leg, with a corner before each point that follows a break.
 
-    A corner has the load of the break, and the response leads straight from there to the point.  Its unprescribed
-    strains E and stresses S are NaN; if the leg changes one component alone, its conjugate follows from the work W up
-    to the point ('): W = (S + S') (E' - E) / 2, plus work of constant stresses, and under given S of the break.
+    A corner has the load of the break; from there the response leads straight to the point, with strain E' and stress
+    S'.  Prescribed strains E or stresses S of the corner equal the break's, others are NaN.  If the leg changes one
+    component alone, its conjugate follows from the work after the break: (S + S') (E' - E) / 2, plus work at constant
+    stress.
     """
     pairs, loads, leg = voigt.plane_state_of(document).components, targets(document), legs_of(document)
     points, corners = document["path"], list[Point]()
@@ -212,9 +213,9 @@ def later_corners(document: Document) -> list[Point]:
 
 
 def scales_with_toughness(document: Document) -> bool:
-    """Return whether strains and stresses are proportional to the root of the toughness.
+    """Return whether strains and stresses along a path are proportional to the root of the toughness.
 
-    This holds if bonds break by energy, on springs that do not depend on the toughness.
+    This holds if all bonds break by energy, on springs that do not depend on the toughness.
     """
     tables = interface_section.interface_tables(document["case"])
     laws = [bond_laws.LAWS.get(table.get("criterion", bond_laws.DEFAULT)) for table in tables]
@@ -223,20 +224,20 @@ def scales_with_toughness(document: Document) -> bool:
 
 
 def rising_points(points: Sequence[Point]) -> Int:
-    """Return the numbers of the points that a rising load reaches."""
+    """Return the numbers of the points at or above all earlier loads, which a rising load reaches."""
     load = np.array([point["load_factor"] for point in points])
     return np.flatnonzero(load >= np.maximum.accumulate(load))
 
 
 def table_of(points: Sequence[Point]) -> dict[str, Float]:
-    """Return the values (n,) of all stresses, all strains and the temperature by name."""
+    """Return arrays (n,) over the points, by name: all stresses, all strains, and the temperature (0 if absent)."""
     strains, names = voigt.voigt_names(len(points[0]["stress"]))
     rows = [[*point["stress"], *point["strain"], point.get("temperature") or 0.0] for point in points]
     return dict(zip((*names, *strains, load_sections.TEMPERATURE), np.array(rows, float).T, strict=True))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
-    """Return the corners (v, 2 c + 1) of a proportional path under a rising load: stresses, strains, temperature.
+    """Return the v corners of a proportional path under a rising load: stresses, strains, temperature, (v, 2 c + 1).
 
     Where bonds break at a load t, all bonds that cannot carry t without these bonds also break.  The cell then follows
     the next stable branch, with a point at load t'.  Each branch is a ray through zero: Sigma(t) = Sigma(t') t / t',
@@ -252,9 +253,9 @@ def load_controlled(points: Sequence[Point]) -> Float:
 
 
 def rising_strain(document: Document) -> Float | None:
-    """Return stresses and leading strain (v, c + 1) of a one-leg path under a rising load.
+    """Return the v corners of a one-leg path under a rising load: stresses and `leading_component` strain, (v, c + 1).
 
-    The strain is made positive. Returns None without a path, with several legs, or if the strain falls somewhere.
+    The strain is made positive.  Returns None without a path, with several legs, or if the strain falls somewhere.
     """
     points = document.get("path")
     if not points or legs(document) != 1:

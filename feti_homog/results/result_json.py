@@ -1,7 +1,7 @@
 """Read and write result.json, write points as CSV tables and event logs, and seal files by checksums.
 
-Each file but the event log is written completely or not at all.  A checksum in a JSON document, or beside a large file,
-reveals damage and edits.  HDF5 may crash on wrong bytes, so readers check a large file before they open it.
+Each file but the event log is written completely or not at all.  A checksum in a JSON document, or in result.json for
+result.h5, reveals damage and edits.  HDF5 may crash on wrong bytes, so readers check that file before they open it.
 """
 
 import contextlib
@@ -35,14 +35,14 @@ SCHEMA = 1  # version of the layout: raise when a key changes name or meaning, o
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Write `directory`/result.json, create the folder if needed, and return the file path.
+    """Write `directory`/result.json, create the folder if needed, and return the file path.  Call on one rank.
 
-    NumPy arrays and scalars become lists and numbers, tuples lists, paths strings. The file is replaced in one
-    step: a reader finds the old document or the new one. Call on one rank.
+    NumPy arrays and scalars become lists and numbers, tuples lists, paths strings.  The file is replaced in one step: a
+    reader finds the old document or the new one.
 
     Raises:
-        FetiHomogError: a number is not finite (one line for each, with its place in the document), or the
-            file cannot be written.
+        FetiHomogError: a number is not finite (one line for each, with its place in the document), or the file cannot
+            be written.
         TypeError: a value has no JSON type.
     """
     text, path = text_of(document), Path(directory) / NAME
@@ -52,7 +52,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def text_of(document: Mapping[str, Any]) -> str:
-    """Write a document with its checksum as text for `loads`.  Values and their errors are as in `write`."""
+    """Serialize a document with its checksum, as text for `loads`.  Conversions and their errors are as in `write`."""
     faults = list[str]()
     content = _json_value(document, "", faults)
     if faults:
@@ -61,7 +61,7 @@ def text_of(document: Mapping[str, Any]) -> str:
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Return the document of `directory`/result.json.
+    """Return the document of `directory`/result.json, without its checksum.
 
     Raises:
         CaseError: the file is missing, is not a JSON table or has changed, or its layout has another version.
@@ -81,9 +81,9 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def _json_value(value: Any, place: str, faults: list[str]) -> Any:
-    """Convert a value to JSON types; add a fault for each number that is not finite.
+    """Convert the value at `place` in a document to JSON types; append a line to `faults` for each non-finite number.
 
-    Raises TypeError with the path of a value without a JSON type.
+    Raises TypeError, with the place, for a value without a JSON type.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -101,7 +101,7 @@ def _json_value(value: Any, place: str, faults: list[str]) -> Any:
 
 
 class DescribedColumn(NamedTuple):
-    """A column of a CSV file."""
+    """The name, unit and meaning of a column in a CSV file."""
 
     name: str
     unit: str
@@ -109,7 +109,7 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the CSV columns for records of a class, with units and meanings."""
+    """Yield a column for each number, text and array component in records of class `kind`, with unit and meaning."""
     for name, description in _in_columns(kind).items():
         # The components in the plane are among the spatial components, in the same order.
         for component in description.spatial_components or description.components or (name,):
@@ -118,7 +118,7 @@ def columns(kind: type) -> Iterator[DescribedColumn]:
 
 
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
-    """Write a CSV table with a row for each record, and return the path.  Call on one rank.
+    """Write a CSV table with a row for each record in `points`, and return the path.  Call on one rank.
 
     The records have one class.  Columns are numbers, strings and array components; empty columns, other arrays and
     nested records are left out.  Raises FetiHomogError if the table cannot be written.
@@ -139,7 +139,7 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _in_columns(kind: type) -> dict[str, records.Description]:
-    """Return the record fields that fill columns.  These are numbers, strings, and arrays with named components."""
+    """Return descriptions of the record fields that fill columns: numbers, strings, arrays with named components."""
     hints = get_type_hints(kind)
     entry = {name: d for name, d in records.descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in entry.items() if not is_dataclass(records.without_none(hints[name]))}
@@ -156,7 +156,7 @@ def csv_text(rows: Iterable[Iterable[Any]], end: str = "\n") -> str:
 class EventLog:
     """The event log in a result folder, which rank 0 writes.
 
-    The first line replaces an earlier log.  After a write error, `say` gets a warning, and the log drops later lines.
+    The first line replaces an earlier log.  After a write error, `say` gets a warning, and later lines are dropped.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
@@ -181,7 +181,7 @@ class EventLog:
             self.close()
 
     def close(self) -> None:
-        """Close the log.  Later lines are ignored."""
+        """Close the log, so that `write` ignores later lines."""
         self._wanted = False
         if self._stream is not None:
             with contextlib.suppress(OSError):  # the stream has no unwritten line
@@ -241,7 +241,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Check a file against its seal; `block` is as in `seal`.  Call on one rank.
+    """Check a file against its `expected` seal, made with the same `block`.  Call on one rank.
 
     Raises CaseError if size or checksum differ, FetiHomogError if the file cannot be read.
     """
@@ -258,13 +258,13 @@ def _checksum(text: str) -> str:
 
 
 def _sealed(text: str, checksum: Any) -> str:
-    """Append the checksum to the text of a document, in the format of `_text`."""
+    """Insert the checksum, as last key, into a document serialized by `_text`."""
     begin = "{" if text == "{}" else text.removesuffix("\n}") + ","
     return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
 
 
 def _text(value: Any, begin: str = "\n ") -> str:
-    """Serialize a value with line breaks and indents `begin`.  An array of numbers, or a matrix row, takes one line."""
+    """Serialize a value; lines inside begin with `begin`.  An array of numbers, or a matrix row, takes one line."""
     if isinstance(value, dict) and value:
         lines = [f"{ENCODE(key)}: {_text(item, begin + ' ')}" for key, item in value.items()]
         return f"{{{begin}{(',' + begin).join(lines)}{begin[:-1]}}}"

@@ -26,11 +26,11 @@ from feti_homog.verify import constitutive_law
 
 @dataclass(frozen=True, repr=False)
 class ViewedState:
-    """One state on its mesh: elements of the cell, or interface points.
+    """One state on the elements of the cell or at the interface nodes, as arrays for a viewer.
 
     Attributes:
-        points: (n, 3) node positions; nodes are torn between subdomains.
-        cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
+        points: (n, 3) positions of cell or interface nodes; cell nodes are torn between subdomains.
+        cells: (m, 3 or 6) triangle nodes, mid-side nodes last; for an interface (k, 1) its nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
         means: rows (1, c) from `xdmf.cell_means`: load_factor, mean_strain, mean_stress and, in space, temperature.
         label: state label.
@@ -69,7 +69,7 @@ def read_state(out: str | Path, number: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Read a cell state from an open result.h5, as `read_state` does."""
+    """Read the cell in state number `state` from an open result.h5, with the fields that `read_state` names."""
     group = file[f"state/{state}"]
     is_spatial, strain = AXIAL_DISPLACEMENT in group, group.attrs["strain"]
     nodes = _tables(file, state, xdmf.CELL_NODES)
@@ -100,7 +100,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Read a state at the interface nodes: displacements of both faces, tractions, jumps, bond states, geometry."""
+    """Read the interface nodes in a state from an open result.h5: faces, tractions, jumps, bond states, geometry."""
     group = file[f"state/{state}"]
     places = xdmf.INTERFACE_POINTS | (xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {})
     nodes, means = _tables(file, state, places), xdmf.cell_means(group.attrs)
@@ -109,7 +109,7 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Read the datasets `places` (paths with K for the state), by the names in `places`."""
+    """Read datasets of a state by name: `places` maps names to paths, in which /K/ stands for the state."""
     return {name: file[place.replace("/K/", f"/{state}/")][()] for name, place in places.items()}
 
 
@@ -150,7 +150,7 @@ def write_vtk(directory: Path, kind: str) -> list[Path]:
 
 
 def _grid(state: ViewedState) -> ET.Element:
-    """Convert a state into VTK's XML, with arrays in base64."""
+    """Convert a state to an XML tree in the format .vtu, with arrays in base64."""
     header = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
     root = ET.Element("VTKFile", header)
     m, columns = state.cells.shape
@@ -176,7 +176,7 @@ def _grid(state: ViewedState) -> ET.Element:
 
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
-    """Write a .vtkhdf file with the common mesh and all states.  `read(file, number)` returns a state."""
+    """Write all states to a .vtkhdf file, on the mesh of the first.  `read(file, number)` returns a `ViewedState`."""
     count = len(file.get("state", ()))
     with h5py.File(path, "w") as out:
         root = out.create_group("VTKHDF")

@@ -1,8 +1,8 @@
 """Write result.xdmf and interface.xdmf, which let ParaView read result.h5.
 
 The files use only features that all XDMF readers of ParaView and VTK support: whole datasets, points with a
-connectivity, tensors with nine components, one temporal collection per file.  Readers load no strings, so a state label
-is the name of a block, which two readers show, and an array of bytes, with the same length in all states.
+connectivity, tensors with nine components, one temporal collection per file.  Readers load no strings.  A state label
+therefore is the name of a block, which two readers show, and an array of bytes, with the same length in all states.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Return the datasets of state fields with one of the `shapes`, by field name, without LISTED datasets."""
+    """Return the datasets of state fields with a shape in `shapes`, by field name, except LISTED datasets."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -99,7 +99,7 @@ def write(directory: Path) -> list[Path]:
 
 
 def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
-    """Return, by name, the load factor, mean strain and mean stress of a state as rows (1, c).
+    """Return rows (1, c), by name, from the attributes of a state: load factor, mean strain and mean stress.
 
     Plane states have vectors with gamma12; other states have tensors (c = 9) with E12, and the temperature.
     """
@@ -112,7 +112,7 @@ def cell_means(attributes: Mapping[str, Any]) -> dict[str, Float]:
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:
-    """Add an attribute of a whole state, with its values in the XML text."""
+    """Add to a grid an attribute of the state as a whole, whose values stand in the XML text."""
     size = f"1 {len(values)}" if kind != "Scalar" else str(len(values))
     number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
     item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
@@ -127,7 +127,7 @@ def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any
 
 
 def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[str, str], centre: str) -> None:
-    """Add an attribute for each dataset of a state in `arrays`."""
+    """Add to a grid an attribute, at nodes or cells (`centre`), for each dataset of a state in `arrays`."""
     for name, dataset in arrays.items():
         table = file[dataset.replace("/K/", f"/{state}/")]
         kind = SHAPES[1 if table.ndim == 1 else table.shape[1]]
@@ -135,7 +135,7 @@ def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[s
 
 
 def _table(table: Any) -> ET.Element:
-    """Return the XML reference to a whole dataset of result.h5."""
+    """Construct the XML element that refers to a whole dataset of result.h5."""
     number = "Char" if table.dtype == np.int8 else NUMBERS[table.dtype.kind]
     form = {"Format": "HDF", "NumberType": number, "Precision": str(table.dtype.itemsize)}
     item = ET.Element("DataItem", form, Dimensions=" ".join(map(str, table.shape)))

@@ -1,4 +1,4 @@
-"""Read the points of a sweep: axis values combined to a grid or row by row, or random samples."""
+"""Read the points of a sweep: values of the keys that vary, combined as a grid or row by row, or random samples."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ Assignment = dict[toml_files.TomlPath, Any]
 
 @dataclass(frozen=True)
 class Axis:
-    """A key that varies.  It has a list of values or, for samples, both ends of a range."""
+    """A key that varies: a list of `values` or, for random samples, the `ends` of a range, logarithmic if `log`."""
 
     path: toml_files.TomlPath
     values: tuple[Any, ...] = ()
@@ -27,7 +27,7 @@ class Axis:
 
     @classmethod
     def of(cls, path: toml_files.TomlPath, value: Any) -> Self:
-        """Build the axis of a valid list or range."""
+        """Build the axis of the key at `path` from a checked list or range {from, to, ...}."""
         if isinstance(value, list):
             return cls(path, tuple(value))
         low, high, step, count = float(value["from"]), float(value["to"]), value.get("step"), value.get("count")
@@ -38,7 +38,7 @@ class Axis:
         return axis if count is None else cls(path, tuple(axis.at(np.linspace(0, 1, count))))
 
     def at(self, fractions: ArrayLike) -> list[Any]:
-        """Interpolate the range at fractions in [0, 1], on a logarithmic scale if `log`."""
+        """Return the key's values at `fractions` in [0, 1] of the range, on a logarithmic scale if `log`."""
         low, high = np.log(self.ends) if self.log else self.ends
         values = low + (high - low) * np.asarray(fractions)
         return [_of_key(value, self.path) for value in (np.exp(values) if self.log else values).tolist()]
@@ -47,8 +47,8 @@ class Axis:
 def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
     """Read the points and settings of a table [sweep].
 
-    A point is a value for every key that varies.  In a grid the last key in the file varies fastest; all sampled keys
-    together are the last axis.  A faulty table gives no points; `faults` gets one line per fault.
+    A point maps each key that varies to a value.  In a grid the last key in the file varies fastest; all sampled keys
+    together are the last axis.  Each fault adds a line to `faults`; a faulty table gives no points.
     """
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
@@ -89,7 +89,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
 
 
 def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> list[Assignment]:
-    """Draw a Latin hypercube, or independent samples, from the box of the axes.  `settings` has number and seed."""
+    """Draw points from the ranges of `axes`, by a Latin hypercube or independently; `settings` has count and seed."""
     count = settings.samples or 1
     if settings.sampling == "latin":
         from scipy.stats import qmc  # a slow import that few sweeps need
@@ -102,7 +102,7 @@ def sampled_points(axes: Sequence[Axis], settings: sections.SweepSection) -> lis
 
 
 def _is_foreign(path: toml_files.TomlPath) -> bool:
-    """Return whether a sweep cannot vary the keys in the section of a path."""
+    """Return whether a path is outside the sections whose keys a sweep may vary."""
     return path[0] not in sections.TOP_LEVEL or path[0] in ("name", sections.SWEEP)
 
 
@@ -112,7 +112,7 @@ def _is_range(path: toml_files.TomlPath, value: Any) -> bool:
 
 
 def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str:
-    """Return the fault of an axis, or an empty string.  Sampled ranges need neither step nor count."""
+    """Return the fault of the value at `path` in [sweep], else "".  Ranges to sample need neither step nor count."""
     if _is_foreign(path):
         names = [*keys.keys_of(sections.SweepSection), *sections.SECTIONS, "material", "petsc"]
         names += [f"{name}.{path[0]}" for name, table in sections.SECTIONS.items() if path[0] in keys.keys_of(table)]
@@ -149,7 +149,7 @@ def rounded(value: float) -> float:
 
 
 def _of_key(value: float, path: toml_files.TomlPath) -> Any:
-    """Round a value to DIGITS digits, or to an integer if the key accepts only integers."""
+    """Round a value to DIGITS significant digits, or to an integer if the key at `path` accepts only integers."""
     value = rounded(value)
     section = sections.SECTIONS.get(path[0])
     entry = keys.keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

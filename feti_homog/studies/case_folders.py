@@ -35,8 +35,8 @@ INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 class Status(StrEnum):
     """The progress of a case.
 
-    An UNCONVERGED case has a result that its checks refuse, a FAILED case an error instead of a result.  The result of
-    a DAMAGED case is unreadable or belongs to another case.  An INTERRUPTED case has events, a WAITING case nothing.
+    An UNCONVERGED case has a result that its checks refuse, a FAILED case only an error.  The result of a DAMAGED case
+    is unreadable or of another case.  A RUNNING case is locked, an INTERRUPTED case has events, a WAITING case nothing.
     """
 
     DONE = "done"
@@ -59,7 +59,10 @@ WITHOUT_RESULT = (Status.UNCONVERGED, Status.FAILED, Status.DAMAGED)
 
 @dataclass(frozen=True)
 class CaseState:
-    """The progress of a case, the reason, and the content of result.json or an unfinished path."""
+    """The progress of a case.
+
+    `reason` says why a result is missing or partial; `document` is result.json or an unfinished path, or None.
+    """
 
     status: Status
     reason: str = ""
@@ -68,7 +71,7 @@ class CaseState:
 
 @dataclass(frozen=True)
 class SweepIndex:
-    """The content of sweep.json: the list of all cases."""
+    """The content of sweep.json: name and stress unit of the sweep, and the list of all cases."""
 
     name: str
     stress_unit: str
@@ -78,8 +81,8 @@ class SweepIndex:
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
     """Refuse a folder that holds another study, or foreign files.  On one rank.
 
-    Raises CaseError for a study's document, and for a non-empty file or subfolder with a name in `entries`; OSError if
-    the folder cannot be read.  `kind` names the new study in the message.
+    Raises CaseError for the document of a study, and for a non-empty file or subfolder with a name that matches
+    `entries`; OSError if the folder cannot be read.  `kind` names the new study in the message.
     """
     for path in sorted(directory.iterdir()):
         if path.name in output_folder.STUDIES:
@@ -92,7 +95,7 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
 def document_lock(directory: Path) -> Iterator[None]:
     """Context manager: lock the document of a study during a block.  On one rank.
 
-    Does nothing on a file system without locks.  Raises CaseError if a process holds the lock for INDEX_LOCK_TIMEOUT_S.
+    Takes no lock if the file system has none.  Raises CaseError if another process holds it for INDEX_LOCK_TIMEOUT_S.
     """
     lock = file_locks.Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S)
     try:
@@ -108,7 +111,7 @@ def document_lock(directory: Path) -> Iterator[None]:
 
 
 def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the sweep folder, or extend its case list.  On one rank.
+    """Make the sweep folder with the list of its cases, or append new cases to a stored list.  On one rank.
 
     Raises:
         CaseError: the folder cannot be made, has another sweep or foreign files, or its list is unreadable or locked.
@@ -152,7 +155,7 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """Read the case list in the sweep folder.  Raises CaseError for an unreadable list."""
+    """Read sweep.json of a sweep folder.  Raises CaseError if it is missing, unreadable or damaged."""
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
@@ -172,7 +175,7 @@ def read_index(directory: Path) -> SweepIndex:
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:
-    """Replace `old` by `new` in nested tables and lists, since JSON has no infinite numbers."""
+    """Return nested tables and lists with `new` in place of `old`: JSON has no infinite numbers."""
     if isinstance(value, dict):
         return {key: _replaced(item, old, new) for key, item in value.items()}
     if isinstance(value, list):
@@ -181,7 +184,10 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case: RUNNING if it has no result and a process holds its lock.  On one rank."""
+    """Return the progress of a case from its files and lock.  On one rank.
+
+    A case without a result is RUNNING if a process holds its lock.
+    """
     state, folder = stored_state(directory, entry), directory / entry.folder
     is_running = bool(file_locks.holder(folder / LOCK_FILE))
     if state.status is not Status.WAITING and not (is_running and state.status is Status.FAILED):
@@ -194,7 +200,7 @@ def case_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case from its files alone, for the lock holder.  On one rank."""
+    """Return the progress of a case by result.json and error.txt alone, without lock and events.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:
@@ -215,10 +221,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write case.toml of a case, without empty sections.  On one rank.
-
-    Raises FetiHomogError if the file cannot be written.
-    """
+    """Write case.toml with defaults, without empty sections.  On one rank.  Raises FetiHomogError if that fails."""
     document = {name: table for name, table in case.resolved().items() if table != {}}
     folder = directory / entry.folder
     atomic.remove_unfinished(folder, re.compile(rf"{CASE_FILE}|{ERROR_FILE}"))
@@ -226,7 +229,7 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Reset a case to WAITING: remove error and events, set aside the result.  On one rank; raises like `set_aside`."""
+    """Remove error.txt and events of a case, and `set_aside` its result.  On one rank.  Raises FetiHomogError."""
     folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
@@ -235,10 +238,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Rename the result.json of a case to result.json.STATUS.  On one rank.
-
-    Also removes the other result files.  Raises FetiHomogError if the folder cannot be written.
-    """
+    """Rename result.json to result.json.STATUS; remove other result files.  On one rank.  Raises FetiHomogError."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     with atomic.file_errors("write", folder):
@@ -248,13 +248,13 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
-    """Write error.txt of a failed case.  On one rank.  Raises FetiHomogError if the file cannot be written."""
+    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if that fails."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Return lines with the inputs of failed cases and the reasons of failures; [] without cases."""
+    """Return printable lines with the inputs of failed cases and the reasons of the failures; [] without cases."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]
@@ -262,7 +262,7 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 
 def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
-    """Return warnings and remarks; lines that agree up to a colon become one, with the number of their cases."""
+    """Return warnings and remarks of all results; lines that agree up to a colon become one, with a count of cases."""
     cases: dict[tuple[str, str], list[str]] = {}
     for kind in ("warning", "remark"):
         for entry, state in zip(entries, states, strict=True):

@@ -22,7 +22,7 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep, with status and reason unless `directory` is None.  On one rank."""
+    """Return a line for each case of a sweep; with `directory` also status and progress.  On one rank."""
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
@@ -34,7 +34,7 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
 
 
 def group_size(comm: Intracomm, ranks_per_case: int | None) -> int:
-    """Return the number of ranks per case, by default all.  Raises CaseError if it does not divide the rank count."""
+    """Return the number of ranks per case, by default all.  Raises CaseError unless it divides the size of `comm`."""
     size = comm.size if ranks_per_case is None else ranks_per_case
     if size < 1 or comm.size % size:
         raise CaseError(f"--ranks-per-case {size}: expected a divisor of the {comm.size} ranks")
@@ -116,7 +116,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """Context manager: make the sweep folder and lock it, `shared` or exclusively (CaseError if held).  Collective."""
+    """Context manager: make and lock the sweep folder.  Raises CaseError if another run holds it.  Collective."""
     lock = file_locks.Lock(directory / case_folders.LOCK_FILE, shared)
 
     def prepare() -> None:
@@ -135,7 +135,7 @@ def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) ->
 
 
 class Outcome(Enum):
-    """Outcome of a request to run a case."""
+    """Outcome of a request to run a case.  A COMPUTED case may have failed."""
 
     COMPUTED = auto()
     FINISHED_BEFORE = auto()
@@ -145,7 +145,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """A group of ranks that runs sweep cases.  `retry` repeats failed cases; `quiet` prints no lines."""
+    """A group of ranks, `comm`, that runs sweep cases.  `retry` repeats failed cases; `quiet` prints no lines."""
 
     comm: Intracomm
     directory: Path
@@ -154,10 +154,10 @@ class CaseRunner:
     quiet: bool
 
     def run_free(self, shows: bool) -> FetiHomogError | None:
-        """Run cases until no free case remains; show the progress if `shows`.  Collective in the group.
+        """Run cases until none is left, and show the progress if `shows`.  Collective in the group.
 
-        The group skips cases that other groups hold; in a last round it waits for the locks of these cases.
-        Returns the error that stopped the group, or None; raises the error if other ranks of the group do not arrive.
+        The group skips cases that others hold; in a last round it waits for their locks.  Returns the error that
+        stopped the group, or None; raises it if other ranks of the group do not report an error in time.
         """
         timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
@@ -185,7 +185,7 @@ class CaseRunner:
         """Run a case unless it is finished, failed without `retry`, or held by another process.  Collective.
 
         The group waits `timeout` seconds for the lock of the case; `advance` shows the share of all cases.  Returns the
-        outcome, and another process that holds the case, else "".  Raises FetiHomogError if a file cannot be written.
+        outcome, and the other process that holds the case, or "".  Raises FetiHomogError if a file cannot be written.
         """
         case, folder = self.sweep.cases[entry.number - 1], self.directory / entry.folder
         lock = file_locks.Lock(folder / case_folders.LOCK_FILE, timeout=timeout)
@@ -218,7 +218,7 @@ class CaseRunner:
             lock.release()
 
     def _claim(self, lock: file_locks.Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
-        """Lock a case, and keep the lock if the case must run.  On one rank.  Returns and raises as `run` does."""
+        """Lock a case to run and return COMPUTED, or return another outcome without a lock.  On one rank; see `run`."""
         folder = self.directory / entry.folder
         try:
             folder.mkdir(exist_ok=True)
@@ -243,9 +243,9 @@ class CaseRunner:
 
 
 def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
-    """Return the description of a case, or of a sweep and its first case.  Collective.
+    """Describe a case, or a sweep and its first case, from its document.  Collective.
 
-    The text is empty except on rank 0.  Raises CaseError or MeshError for a faulty document or first case.
+    Returns text on rank 0, "" elsewhere.  Raises CaseError for a faulty document, MeshError for a faulty cell.
     """
     if sections.SWEEP not in document:
         return description.describe(mpi_errors.on_root(comm, cases.parse, document, folder), comm)
@@ -256,9 +256,9 @@ def describe(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
 
 
 def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
-    """Return a heading and the description of the first case.  Collective.
+    """Describe the first case of a sweep below a heading.  Collective.
 
-    The text is empty except on rank 0.  Raises like `describe`.
+    Returns text on rank 0, "" elsewhere.  Raises CaseError for faulty PETSc options, MeshError for a faulty cell.
     """
     check_options(sweep)
     text = description.describe(sweep.cases[0], comm)
@@ -266,7 +266,7 @@ def describe_first(sweep: Sweep, heading: str, comm: Intracomm) -> str:
 
 
 def check_options(sweep: Sweep) -> None:
-    """Raise CaseError with all faulty PETSc options, each with its cases."""
+    """Check the PETSc options of all cases.  Raises CaseError with all faults, each with its cases."""
     numbers_by_options = dict[str, list[int]]()
     for entry, case in zip(sweep.entries, sweep.cases, strict=True):
         numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)

@@ -54,7 +54,10 @@ def collect(directory: Path, pictures: bool) -> list[str]:
 
 
 def means(table: SweepTable) -> list[str]:
-    """Return the lines of tables of peaks or constants: scatter over realisations, or values at points."""
+    """Return the lines of printed tables of constants or peaks.
+
+    A point with several realisations has a table of means and scatter; all other points share a table of values.
+    """
     known = list(responses(table.finished[0])) if table.finished else []
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names
@@ -79,9 +82,9 @@ def means(table: SweepTable) -> list[str]:
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:
-    """Write cases.csv and statistics.csv atomically, and return their paths.  On one rank.
+    """Write cases.csv and statistics.csv of a sweep, and return their paths.  On one rank.
 
-    Raises FetiHomogError if a file cannot be written.
+    Each file is replaced completely or not at all.  Raises FetiHomogError if a file cannot be written.
     """
     columns = [*table.inputs.values()]
     for name, values in table.outputs.items():
@@ -135,6 +138,6 @@ def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseSta
 
 
 def _columns(rows: Sequence[Mapping[str, Any]], missing: Any) -> dict[str, list[Any]]:
-    """Transpose rows of named values to columns, with a substitute for missing values."""
+    """Transpose rows of named values to a column for each name, with `missing` where a row lacks the name."""
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name, missing) for row in rows] for name in names}

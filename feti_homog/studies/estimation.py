@@ -52,17 +52,17 @@ class ParameterEstimates:
 
     @property
     def rank(self) -> int:
-        """The number of directions that the data determine."""
+        """The number of directions in the space of unknowns that the data determine."""
         return int(np.count_nonzero(self.singular_values > RANK_TOLERANCE * self.singular_values.max(initial=0.0)))
 
     @property
     def undetermined(self) -> list[list[int]]:
-        """The indices of the unknowns in each direction that the data do not determine."""
+        """A list of unknowns, by index, for each direction that the data do not determine."""
         return [[int(k) for k in np.flatnonzero(np.abs(row) > ENTRY)] for row in self.directions[self.rank :]]
 
     @property
     def influence(self) -> Float:
-        """The changes (n, m) of the estimates per standard deviation of the data."""
+        """The change (n, m) of each estimate per standard deviation of each datum."""
         size, V = _sizes(self.x), self.directions[: self.rank]
         pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
@@ -82,31 +82,31 @@ class ParameterEstimates:
 
     @property
     def half_width(self) -> Float:
-        """Half the widths (n,) of the confidence intervals."""
+        """The half widths (n,) of the confidence intervals (level CONFIDENCE); inf for undetermined unknowns."""
         return np.asarray(norm.ppf((1 + CONFIDENCE) / 2) * self.std)
 
     @property
     def correlation(self) -> Float:
-        """The correlation (n, n) of the estimates; undetermined unknowns have a diagonal of NaN and zeros elsewhere."""
+        """The correlations (n, n) of the estimates; of an undetermined unknown NaN with itself, 0 with others."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.covariance / np.outer(self.std, self.std))
 
     @property
     def shares(self) -> Float:
-        """The fractions (n, m) of the variances of the estimates that the data contribute."""
+        """The fraction (n, m) of each estimate's variance that each datum contributes; 0 for zero variance."""
         squares = self.influence**2
         total = squares.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))
 
     @property
     def chance(self) -> float | None:
-        """The probability of such or larger residuals under a correct model; None without degrees of freedom."""
+        """The probability of such or larger residuals if the model is correct; None without degrees of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
     @property
     def misfits(self) -> bool:
-        """Whether the residuals are too large for a correct model."""
+        """Whether the residuals are too large for a correct model: `chance` is below LEAST_CHANCE."""
         return self.chance is not None and self.chance < LEAST_CHANCE
 
 
@@ -145,7 +145,7 @@ def estimate(
 
 
 def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:
-    """Call `squares` at the points (n,) of a simplex (Nelder and Mead) that descends from `start` within bounds."""
+    """Call `squares` along a search for its minimum from `start` (n,) within bounds, by Nelder and Mead's simplex."""
     size = _sizes(start)
     box = np.transpose(bounds) / size[:, None]
     options = {"maxfev": MOST_EVALUATIONS, "xatol": LEAST_CHANCE, "fatol": 1.0}
@@ -155,7 +155,7 @@ def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float
 def summarize(
     x: Float, computed: Float, measured: tuple[Float, Float], derivatives: Float, bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Gather estimates x (n,), with values (m,) and derivatives (m, n) at x; other arguments are as in `estimate`."""
+    """Derive statistics from estimates x (n,), values (m,) and derivatives (m, n) at x; see `estimate` for the rest."""
     y, std = measured
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)
@@ -168,20 +168,20 @@ def summarize(
 
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
-    """Return a message for each undetermined direction, with the unknowns in its row of `rows` (indices of `names`)."""
+    """Return a message for each undetermined direction; `rows` has the indices in `names` of its unknowns."""
     alone, together = "no measured value depends on it", "the measured values do not determine them together"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {alone if len(row) == 1 else together}" for row in rows]
 
 
 def _sizes(x: Float) -> Float:
-    """Return the magnitudes (n,) of unknowns; 1 for zeros."""
+    """Return the magnitudes (n,) of unknowns; 1 for an unknown that is 0."""
     return np.where(x == 0.0, 1.0, np.abs(x))
 
 
 def fit_document(
     unknowns: Mapping[str, sections.Unknown], data: Sequence[Datum], estimates: ParameterEstimates, steps: str = ""
 ) -> dict[str, Any]:
-    """Return the content of fit.json without the entry `name`.  Infinities and NaN become None.
+    """Return the content of fit.json except for its `name`, digest and warnings.  Infinities and NaN become None.
 
     `steps` quotes the key that sets the teeth of a softening law, such as "teeth = 8"; empty without one.
     """

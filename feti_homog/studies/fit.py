@@ -39,7 +39,7 @@ class Fit(Study):
 
     Attributes:
         unknowns: starts and bounds of the unknowns, by dotted key.
-        paths: keys of the unknowns, in the same order, each as a path in the case document.
+        paths: key of each unknown, as a path in the case document.
         tests: changes that each test makes to the case document.
         data: measured values, ordered by test.
     """
@@ -53,14 +53,14 @@ class Fit(Study):
     data: Sequence[Datum]
 
     def at(self, x: Sequence[float]) -> Sweep:
-        """Return the cases of all tests at the unknowns x (n,).  Raises CaseError like `cases`."""
+        """Return the cases of all tests at the unknowns x (n,).  Raises CaseError with the faults of all cases."""
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
-        """Return the cases for pairs of a test number and unknowns (n,).  Raises CaseError with all faults."""
+        """Return a case for each pair of test number and unknowns (n,).  Raises CaseError with all faults."""
 
         def set_output(document: dict[str, Any]) -> None:
-            """Restrict output to numbers, with derivatives of conductivities, and of stiffnesses without contact."""
+            """Reduce [output] of a document, in place, to numbers, with derivatives of linear constants."""
             cell, analysis, output = (document.get(name, {}) for name in ("cell", "analysis", "output"))
             if isinstance(output, dict):
                 kind = analysis.get("type") if isinstance(analysis, dict) else None
@@ -82,12 +82,12 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the data of a test as a slice of all data."""
+        """Return the slice that the data of a test occupy among all data."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return a line on names in spatial tests with another meaning in ply axes; empty without such names."""
+        """Return a remark on names in the data that mean something else in ply axes; "" without such names."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if voigt.PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = engineering_constants.axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -126,7 +126,7 @@ class Fit(Study):
 
 
 def _rounded(x: Sequence[float] | Float) -> Point:
-    """Round unknowns to the digits that the case documents have."""
+    """Round unknowns as case documents store them, to a tuple that identifies an evaluation."""
     return tuple(map(rounded, x))
 
 
@@ -149,7 +149,7 @@ class Evaluations:
     computed: dict[Point, Float] = field(default_factory=dict)
 
     def estimate(self) -> estimation.ParameterEstimates | None:
-        """Estimate the unknowns on rank 0, which directs the other ranks.  Collective.
+        """Estimate the unknowns on rank 0, which tells other ranks the cases to compute.  Collective.
 
         Other ranks return None.  All ranks raise CaseError or ConvergenceError if the search fails.
         """
@@ -170,10 +170,10 @@ class Evaluations:
         return estimates
 
     def _search(self) -> estimation.ParameterEstimates:
-        """Search from the start and, after a poor fit or CaseError, from better points.  On rank 0.
+        """Search for the estimates, on rank 0, from the start and, if the fit stays poor, from better points.
 
-        Each further search begins at the best point computed so far: after `STARTS` - 1 further points and, if the fit
-        is still poor, after a simplex from the start, for derivatives mislead at jumps of a curve.
+        After a CaseError or a chance up to 1 - CONFIDENCE, it begins again at the best of all points and STARTS - 1
+        samples; after a misfit, once more at the best point of a simplex, since derivatives mislead where curves jump.
         """
         estimates = None
         y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
@@ -209,7 +209,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """Return the computed values (m,) at the unknowns x (n,), stored at the first call for x.  On rank 0."""
+        """Return data (m,) computed at x (n,), once for each x.  Raises CaseError and ConvergenceError.  On rank 0."""
         key = _rounded(x)
         folder = self.folders.setdefault(key, f"evaluation-{len(self.folders) + 1:04d}")
         if key not in self.answers:
@@ -222,10 +222,10 @@ class Evaluations:
         return self.computed[key]
 
     def jacobian(self, x: Float) -> Float:
-        """Return the derivatives (m, n) of the computed values by x (n,), exact or by differences.  On rank 0.
+        """Return the derivatives (m, n) of the computed data by x (n,), exact or by differences.  On rank 0.
 
-        With a softening law of few teeth, a step may change no value: that side of the difference is then computed
-        again with the step doubled until a value changes, at most to a tenth of the width of the bounds.
+        With a softening law of few teeth, a step may change no value.  This side of the difference is then computed
+        again, with the step doubled until a value changes, at most to a tenth of the width of the bounds.
         """
         key, centre = _rounded(x), self.values(x)
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
@@ -239,7 +239,7 @@ class Evaluations:
         steps = {(k, side): side * DIFFERENCE * (abs(key[k]) or widths[k]) for k, side in product(inexact, (-1, 1))}
 
         def end(k: int, step: float) -> Point:
-            """Return the unknowns after a step of unknown k, within its bounds."""
+            """Return the unknowns after a step of unknown number k, clipped to its bounds."""
             return _rounded([*key[:k], np.clip(key[k] + step, *bounds[k]), *key[k + 1 :]])
 
         ends = [end(k, step) for (k, _), step in steps.items()]
@@ -265,10 +265,7 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[tuple[dict[str, Any], Float]]:
-        """Run cases for pairs of a test number and unknowns.  Collective.
-
-        Returns pairs of result document and computed data on rank 0, [] elsewhere.
-        """
+        """Run cases in a subfolder; return pairs of result and computed data on rank 0, [] elsewhere.  Collective."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, mpi_errors.on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

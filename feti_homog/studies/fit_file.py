@@ -1,4 +1,4 @@
-"""Read a fit file, a case with unknown constants and measured values, and report all faults."""
+"""Read a fit file: a case with unknown constants and measured values; report all its faults."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -18,12 +18,12 @@ LEAST_STD = 1e-12  # relative to the value: smaller deviations are below roundin
 
 
 def load(path: Path) -> Fit:
-    """Load a fit from a file.  Raises CaseError with all faults of the tables, or else of the cases."""
+    """Load a fit from a file.  Raises CaseError with all faults of its tables or, if these are sound, of its cases."""
     return parse(toml_files.read_document(path), path.parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Fit:
-    """Build a fit from a document whose files are relative to `folder`.  Raises CaseError like `load`."""
+    """Build a fit from a document; file names in it are relative to `folder`.  Raises CaseError like `load`."""
     document = {"name": "fit", **toml_files.to_document(values)}
     reader = FitReader(folder)
     unknowns = reader.unknowns(document.pop(sections.UNKNOWN, None))
@@ -61,13 +61,13 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
 
 @dataclass
 class FitReader:
-    """A reader of the tables in a fit file, with a list of all faults."""
+    """A reader of the tables in a fit file, which collects their faults; file names are relative to `folder`."""
 
     folder: Path
     faults: list[str] = field(default_factory=list)
 
     def unknowns(self, table: object) -> dict[toml_files.TomlPath, sections.Unknown]:
-        """Read the table of unknowns, and return the readable unknowns by key.  Faults go to `faults`."""
+        """Read the table [unknown]; return the readable unknowns by key path.  Each fault adds a line to `faults`."""
         if not isinstance(table, dict) or not table:
             self.faults.append(f"[{sections.UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
             return {}
@@ -86,7 +86,7 @@ class FitReader:
     def tests(
         self, measured: object, tests: object, unknowns: set[toml_files.TomlPath]
     ) -> tuple[list[Assignment], list[Datum]]:
-        """Read the case changes of all tests, and their readable measured values.  Faults go to `faults`."""
+        """Read the case changes of each test, and the readable measured values.  Each fault adds a line to `faults`."""
         if (measured is None) == (tests is None):
             several = f"[[{sections.TEST}]] for each of several, with measured"
             self.faults.append(f"expected [{sections.MEASURED}] for one test or {several}")
@@ -123,7 +123,7 @@ class FitReader:
             self.faults.append(f"{place} = {wording.toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
 
     def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Read the points of a measured curve from its file.  Returns [], and adds a line to `faults`, for a fault."""
+        """Read the points of a measured curve from its file.  After a fault, adds a line to `faults` and returns []."""
         measured = self._read(sections.MeasuredCurve, value, place, sections.CURVE, "{file, std}")
         if measured is None:
             return []
@@ -138,7 +138,7 @@ class FitReader:
         return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
 
     def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
-        """Read a table into a dataclass; return None for a faulty table, with lines in `faults`."""
+        """Read a table into a dataclass `kind`.  For a faulty table, adds lines to `faults` and returns None."""
         if not isinstance(value, dict):
             self.faults.append(f"[{section}] {name} = {wording.toml_value(value)}: expected a table {form}")
             return None
@@ -146,12 +146,12 @@ class FitReader:
 
 
 def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[toml_files.TomlPath, Any]]:
-    """Yield the paths and values of a nested table.  A table that has one of `keys` is a value."""
+    """Yield the path and value of each entry in a nested table; a table with one of `keys` is a value."""
     return toml_files.leaves(table, lambda path, value: bool(value.keys() & {*keys}))
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Read names and rows (strain, stress) of a measured curve.  Raises CaseError for an unreadable or faulty file."""
+    """Read names and rows (strain, stress) of a curve from CSV.  Raises CaseError for an unreadable or faulty file."""
     lines = [(number, line) for number, line, _ in table_columns.lines_of(path) if line]
     head = lines[0][1] if lines else ""
     delimiter = table_columns.delimiter_of(head)

@@ -1,4 +1,4 @@
-"""Extract the outputs of a case, the numbers of result.json that fill cases.csv; describe all columns."""
+"""Extract the outputs of a case, which are the numbers of result.json that fill cases.csv; describe all columns."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -19,9 +19,9 @@ Column = result_json.DescribedColumn
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Return the indices i and j in the column names Cij of a sweep; a plane state may be None.
+    """Return the three numbers that i and j take in the columns Cij of (3, 3) stiffnesses in a sweep.
 
-    If one of the plane states is generalized plane strain, Cij denotes the same entry in all cases.
+    They are 1, 2, 6 with generalized plane strain in `planes`, so that C66 is one entry in all cases; else 1, 2, 3.
     """
     return (voigt.GENERALIZED if voigt.GENERALIZED.name in planes else voigt.PLANE_STRAIN).numbers
 
@@ -29,7 +29,7 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numbers) -> dict[str, float]:
     """Return the numbers in result.json by column name.
 
-    Columns Cij of a (3, 3) stiffness have i, j of `numbers`.  Components that are noise at a point or path are 0.
+    Columns Cij of a (3, 3) stiffness have i, j of `numbers`.  Components that are noise at a point or path become 0.
     """
     solver = document["solver"]
     cell, fractions = document["cell"], document["cell"].get("fractions", {})
@@ -76,7 +76,7 @@ def outputs(document: Document, numbers: Sequence[int] = voigt.PLANE_STRAIN.numb
 
 
 def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffnesses, anisotropies and constants by column name, with mesh errors and bounds."""
+    """Return stiffness entries, anisotropies and constants by column name, with their mesh errors and bounds."""
     values = _linear(document, numbers)
     if (stiffness := document.get("effective_stiffness")) is not None:
         C = np.asarray(stiffness)
@@ -96,7 +96,7 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
 
 
 def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Return stiffness, conductivity, thermal stress and expansion, or their errors, by column name."""
+    """Return stiffness, conductivity, thermal stress and expansion in `section`, or their errors, by column name."""
     values = _entries(section.get("effective_stiffness", ()), numbers)
     values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
     values |= _named(CONDUCTIVITIES, np.ravel(section.get("effective_conductivity", ())).tolist())
@@ -109,15 +109,15 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """Return entries C11, C12, ... by name; {} if `stiffness` is empty.  `numbers` number the rows of a 3 x 3 one."""
+    """Return entries C11, C12, ... + `suffix` of a stiffness by name; {} if empty.  `numbers` label (3, 3) rows."""
     rows = range(1, 7) if len(stiffness) == len(voigt.SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
 def _phases(document: Document) -> dict[str, float]:
-    """Return the largest stresses and utilisations of the phases by column name.
+    """Return the largest stresses and utilisations of each phase by column name.
 
-    Each column is for one load; for angles and paths, it has the largest value of all states.
+    A column is for one load; in analyses of angles and paths, it has the largest value of all states.
     """
     values, is_curve = dict[str, float](), "angle" in document or "path" in document
     for phase in document.get("phase_stresses", ()):
@@ -218,7 +218,7 @@ OUTPUT_COLUMNS = (
 
 
 def named(word: str) -> list[str]:
-    """Describe entries of result.json and columns of cases.csv named `word`.  C11 fits the column Cij."""
+    """Describe entries of result.json and columns of cases.csv with the name `word`; C11 names the column Cij."""
     entries = (records.descriptions(kind).get(word) for kind in result.RECORDS)
     lines = [f"result.json, {word}: {meaning}" for meaning in dict.fromkeys(e.meaning for e in entries if e)]
     for column in OUTPUT_COLUMNS:

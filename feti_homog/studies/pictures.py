@@ -1,4 +1,4 @@
-"""Draw moduli.png or peaks.png (a sweep over the fibre fraction) and fit.png (residuals and fit curves)."""
+"""Draw pictures of studies: moduli.png or peaks.png for a sweep over the fibre fraction, fit.png for a fit."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -38,9 +38,9 @@ NAMES = {
 
 
 def draw_over_fractions(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw moduli, or the onsets and peaks of paths, over varying fibre fractions.  On one rank.
+    """Draw moduli, or stresses at onset and peak, of a sweep over the fibre fraction to its folder.  On one rank.
 
-    Returns the path of moduli.png or peaks.png in a list; [] if nothing is drawn.
+    Returns [path of moduli.png or peaks.png]; [] if the fraction does not vary or no output can be drawn.
     """
     names = panels_of(table) if varies(table, FRACTION) else ()
     if not names:
@@ -51,7 +51,7 @@ def draw_over_fractions(directory: Path, table: SweepTable) -> list[Path]:
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """Name the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak; () if none."""
+    """Choose the outputs to draw: moduli, or stresses at onset and, if all paths have one, at the peak; () if none."""
     spatial = {voigt.plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS, CONDUCTION)
     choices = in_space if True in spatial else (PANELS,)
@@ -63,7 +63,7 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
 
 
 def figure_over_fractions(table: SweepTable) -> Figure:
-    """Draw panels with the first `len(MARKERS)` series over the fibre fraction, and the bounds that the results have.
+    """Draw a panel for each output over the fibre fraction, with the first `len(MARKERS)` series and known bounds.
 
     Generalized plane strain has further panels for Poisson's ratios and thermal expansions.
     """
@@ -94,7 +94,7 @@ def figure_over_fractions(table: SweepTable) -> Figure:
 
 
 def _limit(axes: Axes) -> None:
-    """Limit the ordinate to values with their errors, and to bounds up to half of that range away."""
+    """Limit the ordinate to values with their errors; bounds widen this range by at most half at each end."""
     values: list[Any] = [np.asarray(path.vertices)[:, 1] for shape in axes.collections for path in shape.get_paths()]
     bounds = [line.get_ydata() for line in axes.lines if "bounds" in str(line.get_label())]
     values += [line.get_ydata() for line in axes.lines if "bounds" not in str(line.get_label())]
@@ -106,7 +106,7 @@ def _limit(axes: Axes) -> None:
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
-    """Return bounds by output name: by Reuss and Voigt for C11 and C33, else by Hashin and Shtrikman, or Hill."""
+    """Return bounds by output name: Reuss and Voigt's of C11 and C33, Hashin and Shtrikman's or Hill's of others."""
     bounds = document.get("bounds") or {}
     forms, ends = document.get("conductivity_estimates") or {}, ([bounds["reuss"], bounds["voigt"]] if bounds else [])
     pairs: dict[str, Any] = {f"C{k + 1}{k + 1}": tuple(end[k][k] for end in ends) for k in (0, 2) if ends}
@@ -116,7 +116,7 @@ def bounds_of(document: Document) -> dict[str, tuple[float, float]]:
 
 
 def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, number: int) -> None:
-    """Draw a series of one output.
+    """Draw output `name` of a series, in the colour and marker `number`.
 
     Faint marks are realisations, a line the means with their confidence intervals, wide pale bars the mean mesh errors,
     and dashes or dots the bounds.
@@ -148,13 +148,13 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, numbe
 
 
 def draw_fit(path: Path, document: Mapping[str, Any], results: Sequence[Document] = ()) -> Path:
-    """Draw the residuals and fit curves to `path`; return `path`.  Raises FetiHomogError if it cannot be written."""
+    """Draw residuals and curves of a fit to `path`; return `path`.  Raises FetiHomogError if it cannot be written."""
     with mpl.rc_context(plot_helpers.STYLE):
         return plot_helpers.save(fit_figure(document, results), path)
 
 
 def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) -> Figure:
-    """Draw the residuals and fit curves.
+    """Draw the residuals and curves of a fit with the content `document` of fit.json.
 
     One panel has a row for each single value, with its residual in standard deviations; the other has measured points,
     and computed curves from the `results` of the tests or, without a curve, the computed values at the points.

@@ -1,4 +1,4 @@
-"""Find computed values for a fit or a study of scatter in result.json, and their derivatives by the unknowns."""
+"""Find the computed values for a fit or a study of scatter in result.json, and derivatives by the unknowns."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ TOUGHNESS = "toughness"
 
 @dataclass(frozen=True)
 class Datum:
-    """A measured value.
+    """One measured value.
 
     Attributes:
         test: number of the test, from 0.
@@ -29,7 +29,7 @@ class Datum:
         value: the measurement, in the unit of the computed value.
         std: standard deviation of the measurement.
         strain: strain at a point of a curve, else None.
-        strain_name: component of the strain.
+        strain_name: component of this strain, else "".
     """
 
     test: int
@@ -41,7 +41,7 @@ class Datum:
 
 
 def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
-    """Yield the reasons why a case cannot compute measured values; `place` begins the reasons about a value."""
+    """Yield the reasons why a case cannot compute measured values; a reason about one value begins with `place`."""
     state, kind = voigt.PLANE_STATES[case.analysis.plane], case.analysis.type
     strains, stresses = voigt.voigt_names(6 if state.is_spatial else 3)
     if kind == "stiffness":
@@ -68,7 +68,7 @@ def data_faults(case: Case, data: Sequence[Datum], place: str) -> Iterator[str]:
 def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     """Yield the conflicts between a measured curve and the analysis of its test.
 
-    The strain that rises along a leg is the largest strain, or the strain of the only loaded component.
+    The curve must be over the rising strain of the leg: the largest prescribed or, under one stress, its conjugate.
     """
     state = voigt.PLANE_STATES[case.analysis.plane]
     names = {name for datum in points for name in (datum.strain_name, datum.name)}
@@ -102,9 +102,9 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
 
 
 def responses(document: path_curves.Document) -> dict[str, float]:
-    """Return, by name, the result numbers that a study of scatter reports.
+    """Return, by name, the numbers of a result for which a study reports scatter.
 
-    They are a stiffness's constants, a conductivity's entries, onset and peak of a path, or numbers of other analyses.
+    They are constants of a stiffness, entries of a conductivity, onset and peak of a path, columns of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
@@ -116,7 +116,7 @@ def responses(document: path_curves.Document) -> dict[str, float]:
 
 
 def _values(document: path_curves.Document) -> dict[str, float]:
-    """Return the numbers of a result under the names that a fit file uses."""
+    """Return the numbers of a result by the names that a fit file uses."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
@@ -129,7 +129,7 @@ def _values(document: path_curves.Document) -> dict[str, float]:
 
 
 def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
-    """Return the computed values (m,) at the data.  Raises CaseError if a value, or a curve at a strain, is missing."""
+    """Return the values (m,) computed for m data.  Raises CaseError if a value, or a strain of a curve, is missing."""
     values, ways = _values(document), {"onset": "; no bond breaks"}
     if "path" in document and "stress_left" not in landmarks.peak_of(document):
         values = {name: value for name, value in values.items() if not name.startswith("peak_")}
@@ -143,12 +143,12 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
-    """Return the exact derivatives (m,) of computed values with respect to an unknown, or None.
+    """Return exact derivatives (m,) of computed values by the unknown `name`; None if the result lacks them.
 
-    Elastic constants do not depend on strengths, nor, in a plane, on expansions.  With a single interface the loads at
-    breaks are homogeneous: of degree 1 in the only strength, of degree 1/2 in the toughness of springs that do not
-    soften.  This holds if all loads grow in proportion up to the onset, without a previous temperature.  The result is
-    None if result.json does not determine the derivatives.
+    Elastic constants do not depend on strengths, nor, in a plane, on expansions.  If all loads grow in proportion up to
+    the onset, without a previous temperature, loads at breaks of a single interface are homogeneous: of degree 1 in the
+    only strength, or of degree 1/2 in the toughness of springs that do not soften.  Other derivatives must be in
+    `sensitivities` of result.json.
     """
     tables = interface_section.interface_tables(document["case"])
     name = name.replace("interface.1.", "interface.") if len(tables) == 1 else name
@@ -187,7 +187,7 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
 
 
 def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
-    """Interpolate a path's stress S, and its slope dS/dE, at the strain E of a datum.
+    """Interpolate a path's stress S at the strain E of a datum; return S and the slope dS/dE.
 
     Raises CaseError if another strain component rises along the path, the path ends below E, or the signs differ.
     """

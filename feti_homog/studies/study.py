@@ -39,9 +39,9 @@ class Evaluator:
     warnings: list[str] = field(default_factory=list)  # warnings of the first cases
 
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
-        """Run the sweep cases in the subfolder `name`.  Collective.
+        """Run the cases of a sweep in the subfolder `name`.  Collective.
 
-        Returns result.json of all cases on rank 0; [] elsewhere.  Raises like `case_runs.run_all`.
+        Returns result.json of all cases on rank 0, [] elsewhere; prints the first warnings.  Raises like `run_all`.
         """
         folder = self.directory / name
         case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
@@ -58,7 +58,7 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class Study(ABC):
-    """A study of a case document.  File names in the document are relative to `folder`."""
+    """A study of the cases that a document describes.  File names in the document are relative to `folder`."""
 
     document: Mapping[str, Any]
     folder: Path
@@ -80,19 +80,19 @@ class Study(ABC):
 
     @abstractmethod
     def identity(self, cases: list[str]) -> Any:
-        """Return all inputs of the study in JSON types, with the identities of its first cases."""
+        """Return all inputs of the study as JSON values; `cases` has the identities of its first cases."""
 
     @abstractmethod
     def heading(self) -> str:
-        """Return the text that `feti-homog check` prints before the first case."""
+        """Return the text that `feti-homog check` prints before the description of the first case."""
 
     @abstractmethod
     def answer(self, evaluator: Evaluator) -> dict[str, Any]:
-        """Compute the document of the study, without its digest, on every rank.  Collective."""
+        """Compute the document of the study, except for digest and warnings, on every rank.  Collective."""
 
     @abstractmethod
     def text(self, document: Mapping[str, Any]) -> str:
-        """Return the printed tables of a finished study."""
+        """Return the tables to print for the `document` of a finished study."""
 
     def digest(self) -> str:
         """Return the digest of the study.  Studies with equal cases and inputs have equal digests."""
@@ -100,24 +100,21 @@ class Study(ABC):
         return toml_files.short_digest(json.dumps(self.identity(cases)).encode())
 
     def describe(self, comm: Intracomm) -> str:
-        """Return a description of the study and its first case.  Collective.
-
-        The text is empty except on rank 0.  Raises CaseError or MeshError if the cell of the first case is faulty.
-        """
+        """Describe study and first case on rank 0; "" elsewhere.  Collective.  Raises CaseError and MeshError."""
         heading = mpi_errors.on_root(comm, self.heading)
         return case_runs.describe_first(mpi_errors.on_root(comm, self.first_cases), heading, comm)
 
     def run(
         self, directory: Path, comm: Intracomm, ranks_per_case: int | None, retry: bool, quiet: bool
     ) -> dict[str, Any]:
-        """Run or resume the study.  Collective.
+        """Run or resume the study, and return its document on every rank.  Collective.
 
-        Arguments are as for `case_runs.run_all`.  Returns the document of the study on every rank.
+        Arguments are as for `case_runs.run_all`.
 
         Raises:
             CaseError: the folder holds another study or foreign files, another run writes to the folder, or a result
                 lacks a value that the study needs.
-            ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
+            ConvergenceError: a case failed; or the study has no sound answer, after its files are written.
             FetiHomogError: a file cannot be written.
         """
         size = case_runs.group_size(comm, ranks_per_case)

@@ -23,10 +23,10 @@ class SweepCase:
 
     Attributes:
         number: number of the case, from 1.
-        point: number of the sweep point, from 1: all realisations of a point have its values.
+        point: number of the sweep point, from 1.  Realisations of a point have equal inputs, except seeds.
         realisation: number of the realisation, from 1.
         inputs: values of the keys that vary, by dotted key.
-        identity: digest of the computation; empty before the case is checked.
+        identity: digest of case and PETSc options; empty before the case is checked.
     """
 
     number: int
@@ -61,7 +61,7 @@ class Sweep:
 
 
 def load(path: str | Path) -> Sweep:
-    """Load a sweep from a file.  Raises CaseError with all faults of [sweep], or else of all cases."""
+    """Load a sweep from a file.  Raises CaseError with all faults of [sweep] or, without these, of all cases."""
     document = toml_files.read_document(path)
     if sections.SWEEP not in document:
         raise CaseError(f"{path}: [{sections.SWEEP}]: missing section; `feti-homog run` runs a single case")
@@ -71,8 +71,8 @@ def load(path: str | Path) -> Sweep:
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     """Expand a document with a table "sweep" into its cases.
 
-    The cases run through all points before the next realisation, so that more realisations add cases at the end.
-    File names in the document are relative to `folder`.  Raises CaseError like `load`.
+    All points come before the next realisation, so that more realisations add cases at the end.  File names in the
+    document are relative to `folder`.  Raises CaseError like `load`.
     """
     document = toml_files.to_document(values)
     if sections.SWEEP not in document:
@@ -102,10 +102,10 @@ def cases_at(
         realisations: as in `case_documents`.
         section: name of the section that defines the points, for messages.
         faults: faults of the points.
-        complete: sets further keys in the document of every case.
+        complete: function that sets further keys in the document of a case, in place.
 
     Raises:
-        CaseError: points are faulty; or else cases are, named by their numbers, or their stress units differ.
+        CaseError: faults of points; without them, of cases, with their numbers; or stress units that differ.
     """
     lines = [*faults]
     unchecked = case_documents(document, points, realisations, lines, section)
@@ -130,13 +130,13 @@ def cases_at(
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
-    """Return the digest of a case and its PETSc options, except options that only print."""
+    """Return the digest of a case, from its `digest` and its PETSc options except options that only print."""
     chosen = {name: value for name, value in petsc.items() if not option_table.only_prints(name)}
     return toml_files.short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
 
 
 def case_names(numbers: list[int]) -> str:
-    """Return a phrase that names cases by their numbers."""
+    """Return a phrase with the names of the first cases in `numbers`, and the number of further cases."""
     names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
     rest = len(numbers) - MAX_NAMED_CASES
     return names if rest <= 0 else f"{names} and {rest} more"
@@ -149,10 +149,10 @@ def case_documents(
     faults: list[str],
     section: str = sections.SWEEP,
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
-    """Return the sweep cases, unchecked, with their documents; [] after faults, which are appended to `faults`.
+    """Construct sweep cases and their unchecked documents; [] after faults, which add lines to `faults`.
 
-    The cases run through all points; further `realisations`, if not None, follow at points with a random cell.  Points
-    that differ by their seeds alone are realisations of one point.
+    The cases run through all points; further `realisations`, if not None, follow at points with a random cell, whose
+    seeds count up.  Points whose inputs differ only in `cell.seed` become realisations of one point.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
     if realisations is not None and documents and not any(map(_is_random, documents)):
@@ -186,7 +186,7 @@ def _is_random(document: Mapping[str, Any]) -> bool:
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:
-    """Return the point values by dotted key, with tables split into their entries."""
+    """Return the values of a point by dotted key; a value that is a table becomes an input for each entry."""
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}

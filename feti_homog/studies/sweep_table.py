@@ -19,9 +19,9 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """The statistics (points, ...) of outputs over finished realisations.
+    """The statistics of outputs over finished realisations, as arrays of one shape.
 
-    `ci95` is half the 95 % confidence interval of the mean, by Student's t; NaN, like `std`, below two realisations.
+    `std` and `ci95`, half the 95 % confidence interval of the mean by Student's t, are NaN below two realisations.
     """
 
     count: Float
@@ -31,7 +31,7 @@ class Statistics:
 
     @classmethod
     def of(cls, samples: Float) -> Self:
-        """Compute statistics of the finite samples (n, ...) over the first axis."""
+        """Compute the statistics (...) over the first axis of `samples` (n, ...), whose NaN do not count."""
         is_known = np.isfinite(samples)
         count = is_known.sum(axis=0)
         several = np.where(count > 1, count, np.nan)
@@ -47,7 +47,7 @@ class SweepTable:
     Attributes:
         name, stress_unit: as in the sweep.
         folder, point, realisation, status, reason: values for each case; `reason` explains a missing or partial result.
-        inputs: value of each case by dotted key, None if the key does not vary in the case.
+        inputs: value of each case by dotted key, None if the case does not set the key.
         outputs: values (cases,) by name, NaN for cases without the output; for unfinished paths, values so far.
         documents: result.json of finished cases, else None.
     """
@@ -69,16 +69,16 @@ class SweepTable:
 
     @cached_property
     def points(self) -> list[int]:
-        """The numbers of the points."""
+        """The numbers of the sweep points, in ascending order."""
         return sorted(set(self.point))
 
     def rows(self, point: int) -> list[int]:
-        """Return the table rows of the realisations of a point."""
+        """Return the table rows of the realisations of point number `point`."""
         return [row for row, number in enumerate(self.point) if number == point]
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
-        """The statistics of each output over the finished realisations of each point."""
+        """The statistics (points,) of each output over the finished realisations of each point, by output name."""
         statistics, is_finished = {}, np.array([document is not None for document in self.documents])
         for name, values in self.outputs.items():
             finished = np.where(is_finished, values, np.nan)
@@ -88,7 +88,7 @@ class SweepTable:
 
     @property
     def stated(self) -> list[str]:
-        """The names of outputs, except times, memory, checks, and outputs that are zero in all cases."""
+        """The names of outputs worth a table: not zero in all cases, and no times, memory or checks."""
         names = [name for name, values in self.outputs.items() if np.nan_to_num(values).any()]
         return [name for name in names if not name.startswith(("seconds_", "memory", "check_"))]
 
@@ -99,7 +99,7 @@ class SweepTable:
 
     @cached_property
     def rising(self) -> list[Document]:
-        """The results of finished paths whose stress does not fall before their end."""
+        """The results of finished paths on which stress acts and does not fall before the end."""
         peaks = [(result, landmarks.peak_of(result)) for result in self.finished if "path" in result]
         return [result for result, peak in peaks if "stress_left" not in peak and "event" in peak]
 
@@ -112,7 +112,7 @@ class SweepTable:
         return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
-        """Return a label with the varying inputs of a point, except seeds and the keys in `without`."""
+        """Return a phrase with the varying inputs of a point, except seeds and keys in `without`; "" without inputs."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         labels = []
@@ -148,7 +148,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Series:
-    """The numbers of sweep points that differ by one key and by functions of it; `x` has its ascending values."""
+    """Sweep points that differ in one key, whose ascending values are `x`, and in inputs that are functions of it."""
 
     label: str
     points: list[int]
@@ -156,9 +156,9 @@ class Series:
 
 
 def series_over(table: SweepTable, key: str) -> list[Series]:
-    """Group the points with finished cases into series over a key.
+    """Group the sweep points with finished cases into series over a key.
 
-    A second key that is a function of the first does not split a series.
+    Points in a series agree in all inputs except the key, seeds, and inputs that are functions of the key.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
     along = list[str]()
@@ -175,6 +175,6 @@ def series_over(table: SweepTable, key: str) -> list[Series]:
 
 
 def varies(table: SweepTable, key: str) -> bool:
-    """Return whether a key has more than one value among finished cases."""
+    """Return whether an input has more than one value among finished cases."""
     values = table.inputs.get(key, ())
     return len({v for v, d in zip(values, table.documents, strict=False) if v is not None and d is not None}) > 1

@@ -1,4 +1,4 @@
-"""Read the uncertain numbers of a case, KEY = {mean, std} or {mean, cv}, and their correlation."""
+"""Read the uncertain numbers of a case, written KEY = {mean, std} or {mean, cv}, and their correlation."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """The standard deviations of p numbers by dotted key, and the correlations of pairs."""
+    """Standard deviations of p uncertain numbers by dotted key, and correlations as (key, key, value)."""
 
     std: Mapping[str, float]
     correlation: tuple[tuple[str, str, float], ...] = ()
 
     def matrix(self) -> Float:
-        """Return the correlation matrix (p, p) of all numbers."""
+        """Return the correlation matrix (p, p) of the numbers, in the order of `std`."""
         names, result = [*self.std], np.eye(len(self.std))
         for first, second, value in self.correlation:
             i, j = names.index(first), names.index(second)
@@ -31,7 +31,7 @@ class Uncertainty:
         return result
 
     def propagated(self, J: Float) -> tuple[Float, Float]:
-        """Propagate the covariance V to n results with derivatives J (n, p), to first order.
+        """Propagate the covariance V of the numbers to n results with derivatives J (n, p), to first order.
 
         Returns the standard deviations (n,) of the results, and the fraction (n, p) of each variance that each number
         contributes.  The variances are the diagonal of J V J^T; number k adds J_k (V J^T)_k, which may be negative.
@@ -45,15 +45,15 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] for a document that holds the means."""
+        """Return the section [uncertainty] for a document in which the uncertain numbers are means."""
         pairs = {sections.CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
 def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Extract the uncertain numbers, and leave their means in the document.
+    """Extract the uncertain numbers of a document, and replace them there by their means.
 
-    Appends all faults to `faults`; the result then has no numbers, or impossible correlations.
+    Removes [uncertainty].  Faults add lines to `faults`; the result then has no numbers, or impossible correlations.
     """
     section = sections.UNCERTAINTY
     table = document.pop(section, {})
@@ -93,7 +93,7 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of the correlated pairs."""
+    """Yield the faults in the list `pairs` of correlations between the numbers `named`."""
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
@@ -111,7 +111,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 def _means(
     value: Any, path: toml_files.TomlPath, given: list[tuple[toml_files.TomlPath, Any]], faults: list[str]
 ) -> Any:
-    """Return a value with means of its uncertain numbers; append (path, deviation) to `given`, lines to `faults`."""
+    """Return a value with means for uncertain numbers; append (path, deviation) to `given`, lines to `faults`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
@@ -138,7 +138,7 @@ def _means(
 
 
 def number_at(document: Mapping[str, Any], path: toml_files.TomlPath) -> float | None:
-    """Return the number at a path, or None if there is no number or the path fits several sections."""
+    """Return the number at a path in a document; None if there is no number, or the path fits several sections."""
     result: Any = document
     for name in toml_files.in_lists(path):
         result = result[0] if isinstance(result, list) and len(result) == 1 else result

@@ -4,8 +4,8 @@ Derivatives are exact where results have them, else central differences of runs 
 A random cell may change its arrangement between these runs: then the slopes have a large standard error over the cells.
 
 DIR/means                     sweep folder: the case, or all realisations of a random cell
-DIR/differences               two cases for each number without exact derivatives
-DIR/uncertainty.json
+DIR/differences               sweep folder: two cases for each number without exact derivatives
+DIR/uncertainty.json          the answer: standard deviations, derivatives, shares of the numbers
 """
 
 import re
@@ -34,7 +34,7 @@ Documents = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class ScatterStudy(Study):
-    """A study of the scatter that the uncertain numbers of a case cause.  `means` has their values by dotted key."""
+    """A study of the scatter that the uncertain numbers of a case cause; `means` has their means by dotted key."""
 
     KIND, FILE = "study of scatter", "uncertainty.json"
     ENTRIES = re.compile(r"uncertainty\.json|means|differences")
@@ -44,7 +44,7 @@ class ScatterStudy(Study):
     realisations: int | None
 
     def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
-        """Return all realisations of the cases at points of the inputs.  Raises CaseError with all faults."""
+        """Return all realisations at points of the inputs; keywords set keys of [output].  Raises CaseError."""
         document = {**self.document, "output": self.document["output"] | output}
         return cases_at(document, points, self.folder, self.realisations, section=sections.UNCERTAINTY)
 
@@ -52,7 +52,7 @@ class ScatterStudy(Study):
         return self.cases([{}])
 
     def differing(self, names: Sequence[str]) -> Sweep:
-        """Return the cases with one of `names` a standard deviation below or above its mean, others at their means."""
+        """Return two cases for each of `names`: a standard deviation below and above its mean, others at means."""
         ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
         return self.cases([{tuple(name.split(".")): end} for name, end in ends], mesh_error=False)
 
@@ -80,7 +80,7 @@ class ScatterStudy(Study):
         return study_tables.scatter_text(document)
 
     def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
-        """Return the content of uncertainty.json without its digest.
+        """Return the content of uncertainty.json without its digest and warnings.
 
         `ends` are results one standard deviation below and above the means of the `inexact` numbers.
         """
@@ -131,7 +131,7 @@ def load(path: Path) -> ScatterStudy:
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
-    """Build a study of scatter from a document, with files relative to `folder`.  Raises CaseError like `load`."""
+    """Build a study of scatter from a document, with file names relative to `folder`.  Raises CaseError like `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
     table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
     if isinstance(table, dict):
@@ -171,7 +171,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
 
 
 def is_study(values: Mapping[str, Any]) -> bool:
-    """Return whether a document has a section [uncertainty] or uncertain numbers; both may be faulty."""
+    """Return whether a document has a section [uncertainty] or uncertain numbers, sound or faulty."""
     document = toml_files.to_document(values)
     with_means = dict(document)
     read_uncertainty(with_means, [])
@@ -179,7 +179,10 @@ def is_study(values: Mapping[str, Any]) -> bool:
 
 
 def _data(documents: Documents) -> list[Datum]:
-    """Return placeholder data, of paths only loads and peak components; CaseError if only some paths break or fall."""
+    """Name the numbers that all results have, as data without values.
+
+    Of paths these are only loads and the components at the peak.  Raises CaseError if only some paths break or fall.
+    """
     named = [responses(document) for document in documents]
     names = [name for name in named[0] if all(name in values for values in named)]
     if "path" in documents[0]:  # others are largest at other points, or differ from zero by the mesh alone
@@ -194,6 +197,6 @@ def _data(documents: Documents) -> list[Datum]:
 
 
 def _values(documents: Documents, data: Sequence[Datum]) -> Float:
-    """Return the values (r, n) of n data in r results."""
+    """Return the values (r, n) of n data in each of r results."""
     named = [responses(document) for document in documents]
     return np.array([[values[datum.name] for datum in data] for values in named], float)
