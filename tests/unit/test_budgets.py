@@ -18,7 +18,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # plain statements, friction without load, rates in space, breaks on later legs, ranks with different cases; the third:
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before.
 LINES = {
-    ".": 470 + 18 + 0,
+    ".": 470 + 18 - 2,
     "analysis": 3000 + 139 + 75,
     "case": 2880 + 36 + 120,
     "commands": 560 + 10 + 31,
@@ -26,17 +26,17 @@ LINES = {
     "feti": 6300 + 8 + 60,
     "homogenization": 3230 + 57 + 29,
     "interface": 4000 + 24 - 24,
-    "materials": 1430 + 52 + 122,
-    "mesh": 5500 + 46 + 278,
-    "microstructure": 2140 + 24 + 80,
+    "materials": 1430 + 58 + 122,
+    "mesh": 5500 + 46 + 277,
+    "microstructure": 2140 + 24 + 78,
     "report": 3420 + 217 + 109,
-    "results": 2430 + 223 + 35,
+    "results": 2430 + 227 + 35,
     "schema": 430 + 7 + 5,
     "studies": 2950 + 128 + 2,
     "system": 1770 + 26 + 0,
-    "verify": 3100 + 160 + 75,
+    "verify": 3100 + 162 + 75,
 }
-FILES, TOTAL = 310, 45000 + 791 + 1132
+FILES, TOTAL = 310, 45000 + 798 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
