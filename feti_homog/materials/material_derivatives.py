@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield a `LawChange` for each constant and, in space, expansion.  Raises as `stiffness_of` and `expansion`."""
+    """Yield a `LawChange` for each constant; expansions only in space.  Raises as `stiffness_of` and `expansion` do."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(f"conductivity{end}", k, change, none) for end, k, change in _of_conduction(material))
@@ -102,7 +102,7 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
 
 
 def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, float, Float]]:
-    """Yield name ending, value and dk (3, 3) for each conductivity in the cell's axes."""
+    """Yield, for each conductivity in the cell's axes, the end of its name, its value and dk (3, 3)."""
     k = material.conductivity
     if isinstance(k, material_forms.FibreConductivity):
         yield ".axial", k.axial, np.diag([0.0, 0.0, 1.0])
@@ -119,7 +119,7 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
     """Return the derivative of M, a stiffness or compliance with an imaginary step, in a plane state.
 
-    A spatial state takes the whole matrix, a plane state its block; the state `condensed` eliminates component 33.
+    A spatial state takes all of M, a plane state a block; component 33 is eliminated if the state is `condensed`.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)
@@ -130,7 +130,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate `constants` of C and heat `thermal` along dC, dthermal; without thermal arguments, only of C."""
+    """Differentiate the table `constants` along dC and dthermal; without both thermal stresses, along dC alone."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal
