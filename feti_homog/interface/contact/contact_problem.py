@@ -65,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        All are active except at debonded nodes; there, with `contact`, only the normal multipliers of closed nodes are.
+        Multipliers of debonded nodes are inactive, except the normal multipliers of closed nodes with `contact`.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -89,7 +89,7 @@ class ContactProblem:
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """Return C / C_0 (k, 3) for pulled and for pressed bonds; None if all are 1."""
+        """Return C / C_0 (k, 3) of pulled and of pressed bonds, kept for the last `bonds`; None if all are 1."""
         if self._last and self._last[0][0] is bonds:
             return self._last[0][1]
         factors = None
@@ -101,7 +101,7 @@ class ContactProblem:
         return factors
 
     def _gained(self, bonds: BondState) -> Float:
-        """Return C - C_0 (k,) of damaged normal springs; 0 at other nodes and in the axial problem."""
+        """Return the compliance C - C_0 (k,) that damage adds to normal springs; 0 without damage or normal springs."""
         factors = self._factors(bonds)
         if factors is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(bonds.status))
@@ -113,7 +113,7 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Part bonds `which` (k,); return status (k,): with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
+        """Return statuses (k,) after bonds `which` part: CLOSED under pressure in `lam` with `contact`, else OPEN."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -159,7 +159,7 @@ class ContactProblem:
         return replace(state, solution=self._place_free_fibres(state.bonds, self.solver.completed(state.solution))[0])
 
     def is_linear(self, status: Status) -> bool:
-        """Return whether contact cannot change: no faces are debonded, or faces may overlap.  Collective."""
+        """Return whether contact states cannot change: no faces are debonded, or faces may overlap.  Collective."""
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
@@ -172,7 +172,7 @@ class ContactProblem:
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
 
-        Closes the open faces if they do not carry the load.  Raises like `linear` and `FloatingBodies.place`.
+        If open faces do not carry the load, a second search closes them.  Raises like `linear`, `FloatingBodies.place`.
         """
         try:
             return self._search(load, bonds, start)
@@ -208,7 +208,7 @@ class ContactProblem:
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark strains (v,) that debonding leaves free under prescribed stresses; none with friction.  Collective."""
+        """Mark strains (v,) under given stresses that debonded faces leave free; none with friction.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)

@@ -157,9 +157,9 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """Measure the violation (k,) of Coulomb's law by each node's tractions.
+    """Measure by how much each node's tractions (k,) violate Coulomb's law.
 
-    The law is |t| <= mu p in stick and t = s mu p in slip; along the fibres, without friction, any shear violates it.
+    For shear t and pressure p: |t| <= mu p in stick, t = s mu p in slip; along the fibres any shear violates the law.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

@@ -32,12 +32,12 @@ RIGID = 1e-9
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """The law in which a bond breaks when its spring energy reaches the toughness.
+    """The law in which a bond breaks when its spring energy reaches the toughness G_c of its mode angle psi.
 
         G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
-        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
+        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)],
 
-    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
+    with tractions t_n (<> in tension), t_t and, along the fibre, t_a, which adds G_III = t_a^2 / (2 k_a) to G_II.
 
     Attributes:
         toughness: G_Ic, energy per area.
@@ -86,7 +86,7 @@ class SpringEnergy(SpringLaw):
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The debonding tips of this rank: t intact bonds beside broken bonds.
+    """The data that give released energies at this rank's t debonding tips: intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
@@ -164,7 +164,7 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """The law in one bond state: sqrt(released / (G_c l)) at tips, the spring criterion at other nodes.
+    """The law in one bond state: the utilisation is sqrt(released energy / (G_c l)) at tips, by springs at other nodes.
 
     Attributes:
         tips: tips of this rank.
@@ -191,12 +191,12 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return the mask (p,) of nodes with convex `share`: all but tips, where energies need not be subadditive."""
+        """Return the mask (p,) of nodes with convex `share`: all but tips, whose energies need not be convex."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the released energy (m,) of each break, from blocks H (m, 2, 2) and forces `lam` (m, 2).
+    """Return the energy (m,) that each break would release, from blocks H (m, 2, 2) and forces `lam` (m, 2).
 
     `stiffness` (m, 2) bounds the diagonals of H.  Where H is a rounding error relative to this bound, as at the last
     bond of a fibre, no force can act.  With `contact`, faces that would overlap keep the normal force.

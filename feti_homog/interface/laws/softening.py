@@ -38,7 +38,7 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the constants of a law by `value`, a function of keys; axial stiffness defaults to tangential."""
+    """Return a law's constants by name, from `value`, a function of keys; axial stiffness defaults to tangential."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
@@ -70,7 +70,7 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: SectionValues) -> Self:
-        """Make the law and its damage levels from the keys in [interface]."""
+        """Make the law and its damage levels from the keys in [interface].  Raises CaseError as `levels_for` does."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
         # The levels follow from all sections, so that all ranks agree.
         law_of_all = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
@@ -85,9 +85,9 @@ class CohesiveLaw(SpringLaw):
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
         """Choose the damage levels between the teeth.
 
-        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  The default of `teeth`
-        is the least number for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
-        Raises CaseError if more than MOST_TEETH teeth are necessary.
+        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  If `teeth` is None,
+        their number is the least for which the first tooth exceeds the peak traction by at most the fraction
+        `tolerance`.  Raises CaseError if more than MOST_TEETH teeth are necessary.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
@@ -105,7 +105,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _longest_branch(self) -> float:
-        """The largest branch length s over both pure modes and all nodes."""
+        """The largest branch length s, defined in the module, over both pure modes and all nodes."""
         onsets = self._onsets
         ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
         largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))
@@ -113,7 +113,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def overshoot(self) -> float:
-        """The largest relative excess of the first tooth over the peak traction, in pure modes."""
+        """The largest fraction by which, in pure modes, the first tooth exceeds the peak traction."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
@@ -127,11 +127,11 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau."""
+        """Return the integral of tau from 0 to u."""
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), for damage d < 1."""
+        """Return u (p,) at damage d < 1 on a branch of length s: the root of tau(u) = (1 - d) (1 + s u)."""
 
     def begin(self, k: int) -> Float:
         """Return the numbers of broken teeth (k, 1), zero for `k` intact bonds."""
@@ -225,7 +225,7 @@ class PiecewiseLinear(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """The first zero of tau."""
+        """The least argument u at which tau is 0."""
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
@@ -233,7 +233,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.interp(u, self.knots, self.heights)
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau."""
+        """Return the integral of tau from 0 to u."""
         u = np.minimum(u, self.last)
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
@@ -241,7 +241,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the piece where the sides change order."""
+        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the linear piece in which both sides intersect."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -260,7 +260,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law by a table of tractions over openings in mode I; in other modes s stretches the table to G_c."""
+    """A law by a table of tractions over openings in mode I; in other modes s stretches the table to take G_c."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:
@@ -271,7 +271,7 @@ class TableLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class ExponentialLaw(CohesiveLaw):
-    """A law with tau = exp(-u)."""
+    """A law with a traction that falls exponentially: tau = exp(-u)."""
 
     @property
     def last(self) -> float:
@@ -283,7 +283,7 @@ class ExponentialLaw(CohesiveLaw):
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau = 1 - exp(-u)."""
+        """Return the integral of tau from 0 to u: 1 - exp(-u)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:

@@ -48,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Find the state at `begin`.  Collective; a leg from a waypoint reports its first change of statuses."""
+        """Find the state at `begin`.  Collective; on a leg from a waypoint, the first change of statuses is a point."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
@@ -78,12 +78,12 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Return the prescribed load at a leg fraction, with the slips in scaled x."""
+        """Return the load at a leg fraction as `Prescribed`, with slips that start from the state x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[self.sliding.faces.slips])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""
+        """Set the statuses, x and macroscopic state; add `way`, the energies since the state before, to the sum."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None

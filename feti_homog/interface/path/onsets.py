@@ -28,7 +28,7 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """The first break in one bond state, where debonded faces do not touch.
+    """The conditions for the first break in a bond state in which debonded faces do not touch.
 
     Attributes:
         bonds: bond law at this rank's nodes in the bond state.
@@ -40,7 +40,7 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Take the law and the bonded nodes in a bond state.  Collective; raises like `BondLaw.in_state`."""
+        """Make the law in a bond state, and mark bonded nodes.  Collective; raises like `BondLaw.in_state`."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:

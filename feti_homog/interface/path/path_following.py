@@ -1,11 +1,11 @@
 """Load-induced debonding, Section III.F: the load follows a path, and overloaded bonds break.
 
 `events` finds every break exactly.  On the first leg from zero, without initial gaps, the response is homogeneous of
-degree one: one solve gives the load of the next break, which may be lower than the last load (snap-back).  Later legs
-control the load, see `leg`.  `increments` is the paper's loop.
+degree one: one solve gives the load of the next break, which may be lower than the previous load (snap-back).  Later
+legs control the load, see `leg`.  `increments` is the paper's loop.
 
 Energy.  A break happens at constant load: stresses or strains jump, and work minus the change of stored energy is
-released.  Between breaks, only friction loses energy.  The `energies` of a point count from the last point.
+released.  Between breaks, only friction loses energy.  The `energies` of a point count from the previous point.
 """
 
 from collections.abc import Callable, Iterator, Sequence
