@@ -64,12 +64,12 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """The smallest error (k, k) if `elements` and `arcs` of opposite signs cancel."""
+        """The sizes (k, k) that signed errors keep at least, where `elements` and `arcs` of opposite signs cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
     def absolute(self) -> Float:
-        """The estimate (k, k) of |computed - exact|."""
+        """The estimate (k, k) of |computed - exact|, at least a fraction of its parts."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
         fraction = np.full((len(size),) * 2, self.least_of_two)
         np.fill_diagonal(fraction, LEAST_SHARE)
@@ -211,7 +211,7 @@ def _recovered(
 class Group(NamedTuple):
     """The recovered stresses and arc sides of a subdomain group.
 
-    `place` (classes,): position among the displacements on all boundaries (across materials, in all parts), or NONE.
+    `place` (classes,) are positions among displacements on all boundaries (across materials, in all parts), or NONE.
     """
 
     stress: stress_recovery.RecoveredStress

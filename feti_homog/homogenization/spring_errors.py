@@ -19,7 +19,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """The element sides along springs on this rank, and the interface nodes of all ranks."""
+    """The element sides along springs on this rank, and interface nodes of all ranks, for errors of spring energy."""
 
     def __init__(
         self,
