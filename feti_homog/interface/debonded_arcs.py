@@ -79,7 +79,7 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the energy release rate (c,) of each component, opening and shear or axial shear alone, at least 0.
+    """Return the energy release rates (c,) of opening and shear, or of axial shear alone; at least 0.
 
     Irwin's integral for closing the end of a crack, over the closed length a, is the work per length
 

@@ -37,7 +37,7 @@ class Macroscopic:
     """The macroscopic strains E, with temperature changes, and their work conjugates Sigma.
 
     E.Sigma is an energy per cell area.  With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two
-    states (Betti).
+    states E, Sigma and E', Sigma' (Betti).
 
     Attributes:
         strain, stress: (n,) E and Sigma.

@@ -78,7 +78,7 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) in a bond state; without damage, `intact_compliance` itself."""
+        """Return the spring compliance C (owned rows,) in a bond state; without damage, the solver's own array."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -109,11 +109,11 @@ class ContactProblem:
         return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
-        """Mark the damaged bonds (k,), which are softer in tension than in compression."""
+        """Mark the bonds (k,) whose normal springs damage has softened in tension."""
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) after bonds `which` part: CLOSED under pressure in `lam` with `contact`, else OPEN."""
+        """Return statuses (k,) after bonds `which` part to OPEN or, pressed (`lam` < 0) with `contact`, to CLOSED."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -151,7 +151,7 @@ class ContactProblem:
     def completed(self, state: Equilibrium) -> Equilibrium:
         """Return the state with jumps and rigid-body amplitudes alpha, from its multipliers.  Collective.
 
-        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha stays unchanged.
+        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha is returned itself.
         """
         if state.solution.alpha is not None:
             return state
@@ -208,7 +208,7 @@ class ContactProblem:
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark strains (v,) under given stresses that debonded faces leave free; none with friction.  Collective."""
+        """Mark strains (v,) that debonded faces leave free under given stresses; none with friction.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
@@ -240,8 +240,8 @@ class ContactProblem:
     def _violations(self, bonds: BondState, solution: DualSolution) -> Bool:
         """Mark the nodes (k,) that violate gap >= 0 or pressure >= 0 beyond the solver's error.  Collective.
 
-        The status of a debonded node selects the condition.  A damaged bond needs tension if the bond counts as pulled,
-        and pressure if the bond counts as pressed.
+        The status of a debonded node selects the condition.  A damaged bond must be in tension if it counts as pulled,
+        under pressure if it counts as pressed.
         """
         status, damaged = bonds.status, self.damaged(bonds)
         if not self.contact and not self._any(damaged):
@@ -259,7 +259,7 @@ class ContactProblem:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
         Bonds and pressed faces resist motions.  Closed nodes without a force hold no fibre, and become open if a fibre
-        is free without these nodes.  If there is room, this fibre then takes the position with least squared jumps.
+        is free without these nodes.  If there is room, this fibre then moves to the least sum of squared jumps.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

@@ -108,7 +108,7 @@ class _Fibres:
 
 @dataclass(frozen=True)
 class FloatingBodies:
-    """The free fibres and this rank's open nodes (k,); gaps below `noise` may be the solver's error."""
+    """Free fibres that may move between this rank's nodes `is_open` (k,); gaps up to `noise` may be solver errors."""
 
     comm: MPI.Intracomm
     coarse: natural.NaturalCoarseSpace
@@ -180,7 +180,7 @@ def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[f
 
 
 def _last_share(before: Float, after: Float, motion: Float, slack: float) -> float:
-    """Return the largest w in [0, 1] for which some a give (1 - w) before + w after + motion a >= -slack."""
+    """Return the largest w in [0, 1] for which amplitudes a give (1 - w) before + w after + motion a >= -slack."""
     scale, size = np.abs([before, after]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (before - after) / scale, (before + slack) / scale, (0.0, 1.0))
     return float(result.x[-1])

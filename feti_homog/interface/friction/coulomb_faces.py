@@ -47,7 +47,7 @@ class CoulombFaces(FaceSystem):
         return found
 
     def all_allowed(self) -> Bool:
-        """Return the mask (n, 4) of all statuses; without friction, a face may only be open or FORWARD."""
+        """Return the mask (n, 4) of possible statuses: all four or, without friction, only OPEN_FACE and FORWARD."""
         allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
@@ -127,7 +127,7 @@ class CoulombFaces(FaceSystem):
         return float((tangential * (after - before)[self.slips])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy that faces lose on the straight path between states x at constant load, and its heat."""
+        """Return the energy lost by faces on a straight path between states x at constant load, and the heat in it."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)

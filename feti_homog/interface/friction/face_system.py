@@ -52,7 +52,7 @@ class FaceSystem:
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """Scale the stiffness (m, m) of n pairs of jumps (normal, tangential), then v loads: m = 2n + v."""
+        """Scale the stiffness (m, m), m = 2n + v, of n jumps (normal, tangential), then v loads; `friction` is (n,)."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction, self.nodes = friction, n
         self.gaps, self.slips, self.loads = slice(0, 2 * n, 2), slice(1, 2 * n, 2), slice(2 * n, len(stiffness))
@@ -72,7 +72,7 @@ class FaceSystem:
         return f[self.gaps], f[self.slips]
 
     def rooms(self, status: Status, x: Float, slip: Float | float, pressure: Float | float) -> Float:
-        """Return the room (4, n), force or jump, that each node has before a change to each status; inf if not direct.
+        """Return the force or jump (4, n) left to each node before a direct change to each status; inf if not direct.
 
         The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with added
         pressure; g_n is the room of an open node, in the row STICK.
@@ -99,7 +99,7 @@ class FaceSystem:
             self._followed = before._followed
 
     def terms(self, x: Float) -> Float:
-        """Return sum_j |S_ij x_j| (m,), the rounding scale of S x, in single precision."""
+        """Return the scale (m,) of rounding in S x, in single precision: sum_j |S_ij x_j|."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
@@ -177,7 +177,7 @@ class FaceSystem:
         return np.asarray(np.abs(rows) + self.terms(self.terms(fixed)))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,), with `start` in free entries, and the right-hand side (m,) of loads and added pressures."""
+        """Return x (m,), with `start` in free entries, and the right-hand side (m,): loads and added pressures."""
         x, rows = start.copy(), np.zeros(len(start))
         x[self.gaps] = np.where(status == status_system.OPEN_FACE, x[self.gaps], 0.0)
         x[self.slips] = np.where(status == status_system.STICK, load.slip, x[self.slips])

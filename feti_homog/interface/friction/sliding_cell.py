@@ -69,7 +69,7 @@ class CondensedProblem:
         return self.interface.nodes.row[node][:, None] + np.arange(self.solver.jump_operator.components)
 
     def multipliers(self, jump: Float, strain: Float) -> Float:
-        """Return lam (owned rows,) under jumps (n,) in the condensed rows and strains (v,)."""
+        """Return the multipliers lam (owned rows,) under jumps (n,) in the rows D and strains (v,)."""
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
@@ -251,8 +251,8 @@ class SlidingCell:
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
         """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        All `loads` scale the certificate; `kkt_friction` is the largest of `coulomb_errors` relative to the largest
-        traction.
+        Errors are relative to the largest effects of all `loads`; `kkt_friction` is the largest of `coulomb_errors`
+        over the largest traction.
         """
         of_problems = list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()

@@ -72,9 +72,9 @@ class StatusSearch:
         """Search by Lemke's method: admissible statuses under an added pressure that falls to zero.
 
         At a large pressure t d, d random, all faces allowed to touch are STICK or, without friction, FORWARD.  As t
-        falls, nodes change their statuses one by one; after each change t goes on, down or up, as the new status
-        admits.  At the end det M >= 0 (`status_system`).  None if t rises without end, at SOLVES + 4 n changes, or as
-        in `_balanced`.
+        falls, nodes change their statuses one by one; after a change t goes on, down or up, as the new status admits.
+        At the end det M >= 0 (`status_system`).  None if t rises without end, after SOLVES + 4 n changes, or as in
+        `_balanced`.
         """
         faces, load, rest = self.faces, self.load, np.zeros(len(self.start))
         # Nodes of a symmetric cell would reach limits together under equal pressures.
@@ -114,7 +114,7 @@ class StatusSearch:
         return result if balanced else None
 
     def _rooms(self, status: Status, x: Float, pressure: Float | float = 0.0) -> Float:
-        """Return the rooms (4, n) of `FaceSystem.rooms` up to allowed statuses; inf for others."""
+        """Return `FaceSystem.rooms` (4, n) before changes to allowed statuses; inf for other statuses."""
         enters = self.allowed.T.copy()
         enters[STICK] |= self.allowed[:, FORWARD]  # an open face without friction closes to FORWARD
         return np.where(enters, self.faces.rooms(status, x, self.load.slip, pressure), np.inf)

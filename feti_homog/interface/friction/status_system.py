@@ -208,7 +208,7 @@ class FollowedStatuses:
         self._count = 0
 
     def _inverse(self, c: Float) -> Float:
-        """Return M^-1 c (m,)."""
+        """Return the solution M^-1 c (m,) for a right-hand side c (m,)."""
         size, permuted = self._size, np.empty(self._size)
         permuted[self._index] = c
         nonzero = np.flatnonzero(permuted)
@@ -235,7 +235,7 @@ class FollowedStatuses:
         return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
+        """Add prescribed entries to x; the present entries get the indices `old` (m,) in S (m', m').
 
         New scales multiply the entries of S by units_i units_j, with `units` (m,); S also changes between the entries
         with the indices `other`.  Return False if a pivot is too small; R is then useless.

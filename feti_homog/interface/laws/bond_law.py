@@ -32,7 +32,7 @@ Sections = Sequence[interface_section.InterfaceSection]
 class SectionValues:
     """The values of [interface] keys at nodes (k,) in the sections `bonds`, with section indices `pair` (k,).
 
-    The factor of the fibre, a number or (k,), multiplies strengths; its square multiplies toughnesses.
+    Strengths are multiplied by `factor`, a number or (k,), of the node's fibre, and toughnesses by `factor` squared.
     """
 
     bonds: Sections
@@ -47,7 +47,7 @@ class SectionValues:
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """Return the values (s,) of s sections for the factor 1, equal on every rank; (inf,) without sections."""
+        """Return the first value that each of s sections sets (s,), without factors; (inf,) without sections."""
         values = []
         for bond in self.bonds:
             candidates = [getattr(bond, name) for name in (key, *more)]
@@ -85,7 +85,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Return the modes of breaks under tractions (p, c): utilisations (p, c), or mode angles (p, 1) in degrees."""
+        """Return modes of breaks under tractions (p, c): component utilisations (p, c), or angles (p, 1) in degrees."""
 
     @classmethod
     @abstractmethod
@@ -219,6 +219,6 @@ def law_class(name: str) -> type[BondLaw]:
 
 
 def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law from the arguments of `SectionValues`; without sections no bond breaks."""
+    """Make the bond law of sections at nodes from the arguments of `SectionValues`; without sections none breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))

@@ -37,7 +37,7 @@ class SpringEnergy(SpringLaw):
         G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
         G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)],
 
-    with tractions t_n (<> in tension), t_t and, along the fibre, t_a, which adds G_III = t_a^2 / (2 k_a) to G_II.
+    with normal traction t_n, <x> = max(x, 0), shear t_t; along the fibre t_a adds G_III = t_a^2 / (2 k_a) to G_II.
 
     Attributes:
         toughness: G_Ic, energy per area.
@@ -64,7 +64,7 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return the factor sqrt(G_Ic / G_c) (p,) for the modes of tractions (p, c)."""
+        """Return sqrt(G_Ic / G_c) (p,), by which the mode of tractions (p, c) reduces the utilisation."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
@@ -164,7 +164,7 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """The law in one bond state: the utilisation is sqrt(released energy / (G_c l)) at tips, by springs at other nodes.
+    """The law in one bond state: utilisation sqrt(released energy / (G_c l)) at tips, as in `SpringEnergy` elsewhere.
 
     Attributes:
         tips: tips of this rank.

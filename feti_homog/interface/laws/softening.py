@@ -45,7 +45,7 @@ def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law with softening, where the history of a bond counts broken teeth.
+    """Base class of laws with softening, in which the history of a bond counts broken teeth; symbols as in the module.
 
     Attributes:
         normal_strength, tangential_strength: N and S.
@@ -85,8 +85,8 @@ class CohesiveLaw(SpringLaw):
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
         """Choose the damage levels between the teeth.
 
-        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  If `teeth` is None,
-        their number is the least for which the first tooth exceeds the peak traction by at most the fraction
+        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  Without a number
+        `teeth`, take the least number for which the first tooth exceeds the peak traction by at most the fraction
         `tolerance`.  Raises CaseError if more than MOST_TEETH teeth are necessary.
         """
         s = self._longest_branch
@@ -164,7 +164,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """Return C / C_0 = 1 / (1 - d) (k, 3) of springs; 1 for normal springs without tension and for broken bonds."""
+        """Return the ratio C / C_0 = 1 / (1 - d) (k, 3); 1 for broken bonds, and for normal springs without tension."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
@@ -192,7 +192,7 @@ class CohesiveLaw(SpringLaw):
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """Return the breaking energies W_j (p,) of teeth j under tractions (p, c).
+        """Return the spring energies W_j (p,) at which teeth j break under tractions (p, c).
 
         `tooth` has a number j for each bond, or one number for all bonds.
         """
@@ -241,7 +241,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the linear piece in which both sides intersect."""
+        """Return u (p,) at damage d: the root of tau(u) = (1 - d) (1 + s u), on the linear piece that contains it."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -287,7 +287,7 @@ class ExponentialLaw(CohesiveLaw):
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
+        """Return u (p,) at damage d: the root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
         for _ in range(MOST_STEPS):

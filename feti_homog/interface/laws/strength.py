@@ -58,7 +58,7 @@ class MaxStrength(Strength):
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the first component reaches its strength; as in `BondLaw`."""
+        """Return the load factors (p,) at which a component first reaches its strength; see `BondLaw.first_factor`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         towards = np.abs(ds)
@@ -75,7 +75,7 @@ class QuadraticStrength(Strength):
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the squared utilisations sum to 1; as in `BondLaw`."""
+        """Return the load factors (p,) at which squared utilisations sum to 1; see `BondLaw.first_factor`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])

@@ -89,7 +89,7 @@ class CoulombLeg(Leg):
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break, if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, which a break may have changed.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
@@ -108,7 +108,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to new statuses and scaled x; add the work and the losses, energies per area."""
+        """Advance on a straight path to new statuses and scaled x; sum up its work and the given energies, per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the carried leg fraction, and the error beyond it; (`share`, None) also if the step is stuck."""
+            """Return the leg fraction that the cell carries and the error beyond it; (`share`, None) if stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

@@ -130,7 +130,7 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or to the end of the straight response.  Collective.
+        """Advance to the leg fraction `target`, or to one before it if the response bends.  Collective.
 
         Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
         """

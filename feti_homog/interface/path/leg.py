@@ -51,7 +51,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after any break in `begin`.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, which a break may have changed.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:

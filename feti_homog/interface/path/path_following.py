@@ -29,7 +29,7 @@ def events(
 
     A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a point
     precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with `broke` = 0;
-    the response is straight up to a point, from the state behind the last break.  A point without convergence is the
+    the response is straight up to a point, from the state after the last break.  A point without convergence is the
     last one.  Raises NotCarriedError if the cell carries no more load; the last point is at the largest load.
     """
     for leg in range(begin.leg, len(waypoints)):

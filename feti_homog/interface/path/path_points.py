@@ -97,7 +97,7 @@ def break_bonds(
 ) -> tuple[int, int, PathState]:
     """Break the bonds in the mask `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
 
-    Return the numbers of bonds that part and that soften, over all ranks, and the path state `place` after the break.
+    Return the numbers of bonds that part and that soften, over all ranks, and `place` with the bonds after the break.
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)
