@@ -25,7 +25,7 @@ TIP_TRIANGLES = 2.0
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return sorted tip directions in degrees by curve: n from 0 for a fibre's outer curve, ~n within its coating."""
+    """Return sorted tip directions (degrees) by curve: n for the outline of fibre n (from 0), ~n within its coating."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         ends = {phase_names.COATING, phase_names.MATRIX} & {*(interface.between or ())}
@@ -36,7 +36,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips / cell width; None for the size on interfaces.
+    """Return the element size at tips / cell width; None if the size on interfaces also holds at tips.
 
     Without `tip_size` in the case, the size follows from the ratio R of the mean fibre radius to the cell width,
 

@@ -64,13 +64,13 @@ class Response:
 
     @property
     def leading(self) -> str:
-        """The largest plane strain and its stress, in words."""
+        """The largest in-plane strain and the stress of this component, in words."""
         k = int(np.abs(self.strain[: len(voigt.STRAINS)]).argmax())
         return f"{voigt.STRAINS[k]} {self.strain[k]:.4g}, {voigt.STRESSES[k]} {self.stress[k]:.4g}"
 
     @property
     def all_loads(self) -> Float:
-        """The loads of the response: all entries of `DualSolution.strain`, scaled."""
+        """All loads of the response, the entries of `DualSolution.strain`, times `scale`."""
         return self.scale * self.state.solution.strain
 
     @property
@@ -273,7 +273,7 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert interface lengths (f,) to degrees: arcs of round, uncoated fibres, else fractions of 360 degrees."""
+        """Convert interface lengths (f,) to degrees: by the radius of round, uncoated fibres, else as shares of 360."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
@@ -289,5 +289,5 @@ class FibreInterfaces:
 
 
 def asymmetry(L: Float) -> float:
-    """Return the relative asymmetry max |L - L^T| / max |L|."""
+    """Return the relative asymmetry max |L - L^T| / max |L| of a matrix L."""
     return float(np.abs(L - L.T).max() / np.abs(L).max())

@@ -192,7 +192,7 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
-    """List warnings: cohesive laws, process zones of unlikely length, and elements too long for the process zone.
+    """List warnings about cohesive laws, unlikely lengths of process zones, and elements too long for a process zone.
 
     Args:
         width: cell width.
@@ -235,7 +235,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """List warnings of cohesive laws: energies that depend on the order of modes, and teeth above the peak traction."""
+    """List warnings about cohesive laws: energies depend on the order of modes, or teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften

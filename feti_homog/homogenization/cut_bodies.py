@@ -83,7 +83,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Return, by part, the number of copies of each row (n, 3), and 1 for the first copy: (n, 2).  Collective."""
+        """Count the copies of each row in `parts` (n, 3) on all ranks, and mark first copies: (n, 2).  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)

@@ -152,7 +152,7 @@ class TipZones:
         return tips, np.minimum(self.reach(tips), SINGULAR * length)
 
     def weights(self, points: Float, tips: debonded_arcs.CrackTips, reach: Float) -> Float:
-        """Return weights (e,) of the errors of elements at `points` (e, 2), beside the errors at tips by growing zones.
+        """Return weights (e,) of element errors at `points` (e, 2), to which `energy_changes` of growing zones add.
 
         The weight is 1 - q - (1 + order) r dq/dr at the distance r from a tip, and so 0 in cores and 1 beyond zones.
         """
@@ -206,7 +206,8 @@ class TipZones:
         return fields.change(part.L, loads[problem.strains :], moved, changed)
 
     def release(self, response: Response, interface: ContactProblem) -> EnergyRelease:
-        """Return the energy release rates at all tips of a response to a contact problem.  Collective."""
+        """Return the energy release rates at all tips of a response; `interface` is the contact problem.  Collective.
+        """
         solution, in_plane = response.solution, self.cell.solver.problem.turns
         tips, status = self.tips(response), self.gathered(response.state.status)
         jump = self.gathered(interface.jump(solution))
@@ -228,7 +229,7 @@ class TipZones:
         return EnergyRelease(fibre=fibre, pair=pair, direction=direction, modes=modes, length=length)
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response, springs: Float) -> Float:
-        """Return G (t,) by a virtual crack extension at each tip.  Collective.
+        """Return energy release rates G (t,), by a virtual crack extension at each tip.  Collective.
 
         `springs` (n,) are the energies per length of elastic bonds at the interface nodes.
         """

@@ -64,7 +64,7 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """The sizes (k, k) that signed errors keep at least, where `elements` and `arcs` of opposite signs cancel."""
+        """The least sizes (k, k) of signed errors, in case `elements` and `arcs` of opposite signs cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
@@ -86,9 +86,9 @@ def energy_errors(
     """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
-        responses, contact: the responses, all to the same intact bonds, and whether faces touch.
+        responses, contact: the responses, all with the same intact bonds, and whether faces touch.
         nested: whether to use the coarser mesh; by default the result of `is_nested`.
-        zones: about the tips of debonded responses; found here by default.
+        zones: zones about the tips of debonded responses; found here by default.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested

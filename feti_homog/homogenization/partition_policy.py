@@ -87,7 +87,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
-        """Return the piece count across materials of a cell or image, a multiple of `n_ranks`; 0 for cuts by body."""
+        """Return the number of pieces across materials, a multiple of `n_ranks`; 0 if the cell is to be cut by body."""
         if not self.across_dofs or (dofs > self.across_dofs and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:

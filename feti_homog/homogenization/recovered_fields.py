@@ -35,7 +35,7 @@ class RecoveredFields:
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
-        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, -q at 13, 23 and 33.
+        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, - flux at 13, 23, 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
             hydrostatic stress is a third of the trace.  Phases without a determined S33, or in conduction, are absent.
     """
@@ -157,7 +157,7 @@ def _stresses(
 
 
 def _measures(material: material_forms.Material, stress: Float) -> Float:
-    """Compute `MEASURES` (n, 3 + strength modes) of stresses (n, 6); only the largest principal stresses are exact."""
+    """Compute `MEASURES` (n, 3 + strength modes) of stresses (n, 6); small principal stresses may be lower bounds."""
     in_plane, S33, shears = stress[:, voigt.IN_PLANE], stress[:, 2], stress[:, [3, 4]]
     von_mises, hydrostatic = voigt.spatial_von_mises(in_plane, S33, shears), stress[:, :3].mean(axis=1)
     if not shears.any():

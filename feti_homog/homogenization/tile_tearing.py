@@ -99,7 +99,7 @@ def filled_tiles(
 ) -> list[tuple[int, tile_filling.Tile, tile_filling.Filling]]:
     """Deal the `tiles` of rank 0 to all ranks, and fill them.  Collective.
 
-    Return number, tile and filling of this rank's tiles.  Raises MeshError on every rank if gmsh cannot fill a tile.
+    Return (number, tile, filling) of this rank's tiles.  Raises MeshError on every rank if gmsh cannot fill a tile.
     """
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
@@ -114,8 +114,8 @@ def can_be_torn_by_tiles(
 ) -> bool:
     """Return whether the ranks can cut the cell without the whole mesh.
 
-    Arc tips, bodies cut by the sides, a given subdomain count, which may be below the tile count, and cells probably
-    small enough for cuts across materials need the whole mesh on one rank, like a user's mesh or a single tile.
+    The whole mesh on one rank is needed for arc tips, bodies cut by the sides, a given subdomain count (it may be below
+    the tile count), cells probably small enough for cuts across materials, user's meshes and single tiles.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -197,7 +197,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """Assign a rank to each subdomain (s,) with `load` (s,), by the `neighbours` of all ranks."""
+    """Return a rank for each subdomain (s,), from the `load` (s,) and the result of `_neighbours` on all ranks."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)

@@ -124,7 +124,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,) and `loads` E.  Collective."""
+        """Return multipliers (B B^T)^-1 B (-K u - Q E) (owned rows,) under u (dofs,) and `loads` E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -132,7 +132,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factor of the interior on a coarser mesh, for a group of subdomains with one phase.
+    """The factored stiffness of interiors on a coarser mesh, for a group of subdomains with one phase.
 
     Attributes:
         members: subdomains.
@@ -171,7 +171,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield this rank's subdomain interiors, refined, assembled and factored on a coarser lattice, by group."""
+    """Yield the `NestedInterior` of each group of this rank's subdomains, on the lattice `coarser`."""
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]

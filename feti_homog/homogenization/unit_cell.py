@@ -55,7 +55,7 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """The first degree of freedom of each part in this rank's vectors, and their length: (parts + 1,)."""
+        """The first degree of freedom of each part in this rank's vectors, then the vectors' length: (parts + 1,)."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
@@ -100,7 +100,7 @@ class TornCell:
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
         """Return the multipliers and openings (owned rows of `jumps`,) between all parts.  Collective.
 
-        If subdomains reach across materials, they follow from the displacements `u` (dofs,) of this rank's parts.
+        If subdomains reach across materials, both follow from the displacements `u` (dofs,) of this rank's parts.
         """
         if not self.summary.across or not self.jumps.global_rows:  # without jumps the cell is a single part
             return solution.lam, solution.opening
@@ -182,7 +182,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Return the area fraction of each phase, in the cell including voids.  Collective."""
+        """Return the area fraction of each phase; the area of voids counts as cell area.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
