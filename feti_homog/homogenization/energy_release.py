@@ -206,8 +206,7 @@ class TipZones:
         return fields.change(part.L, loads[problem.strains :], moved, changed)
 
     def release(self, response: Response, interface: ContactProblem) -> EnergyRelease:
-        """Return the energy release rates at all tips of a response; `interface` is the contact problem.  Collective.
-        """
+        """Return the energy release rates at all tips of a response to the contact problem `interface`.  Collective."""
         solution, in_plane = response.solution, self.cell.solver.problem.turns
         tips, status = self.tips(response), self.gathered(response.state.status)
         jump = self.gathered(interface.jump(solution))

@@ -195,7 +195,7 @@ def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
 def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverseIsotropy:
     """Return the constants of the transversely isotropic material nearest to a stiffness C (6, 6), see `about_fibres`.
 
-    `deviation` is ||C - C_nearest|| / ||C||.  Free strains `expansion` (6,) give alpha_33 and (alpha_11 + alpha_22)/2.
+    `deviation` is ||C - C_nearest|| / ||C||.  `expansion` (6,) gives alpha_33 and (alpha_11 + alpha_22)/2, else None.
     """
     c = np.asarray(stiffness, dtype=float)
     table = {name: float(value) for name, value in about_fibres(c).items()}

@@ -42,7 +42,7 @@ def stiffness_of(material: material_forms.Material, plane: str) -> Float:
 
 
 def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
-    """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
+    """Return the stiffness C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0.  Raises
     ValueError if the constants do not determine C, contradict each other or belong to no stable material.
@@ -67,7 +67,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3) in cell axes, flux -k grad T.  ValueError unless k is given, symmetric and positive definite."""
+    """Return the conductivity k (3, 3) in cell axes; ValueError unless it is given, symmetric, positive definite."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
@@ -92,7 +92,7 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
 
 
 def spatial_stiffness(material: material_forms.Material) -> Float:
-    """Return C (6, 6): S = C E in the cell's axes, symmetric positive definite, in stress units.
+    """Return the stiffness C (6, 6), from strains to stresses in the cell's axes, symmetric positive definite.
 
     Raises ValueError as `plane_stiffness` does, and for a given stiffness (3, 3).
     """
@@ -230,7 +230,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
 
 
 def missing_constants(form: type[Any], names: Collection[str], plane: str) -> list[str]:
-    """List faults, one a line: constants that a mechanical plane state needs, and the keys `names` of a form lack."""
+    """List faults, one a line: constants that a form needs in a mechanical plane state, but lacks among `names`."""
     state, faults = voigt.PLANE_STATES[plane], []
     if form is material_forms.TransverselyIsotropic and not {"nu_transverse", "G_transverse"} & {*names}:
         faults.append("nu_transverse, G_transverse: missing; expected one")

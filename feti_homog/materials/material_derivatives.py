@@ -34,8 +34,8 @@ class LawChange:
     Attributes:
         name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
         value: value of the constant.
-        stiffness: dC, (3, 3) or (6, 6); in conduction dk, (3, 3).
-        expansion: (6,) d alpha.
+        stiffness: derivative of the stiffness, (3, 3) or (6, 6); in conduction of the conductivity (3, 3).
+        expansion: (6,) derivative of the free strains per unit of temperature.
     """
 
     name: str
@@ -130,7 +130,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate the table `constants` along dC and dthermal; without both thermal stresses, along dC alone."""
+    """Differentiate the table `constants` along dC and dthermal; unless both thermal stresses exist, along dC alone."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

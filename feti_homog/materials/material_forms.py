@@ -191,7 +191,7 @@ MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compres
 
 
 def criterion(strength: PhaseStrength) -> str:
-    """Return the name of the criterion that the keys select.  Raises ValueError unless one criterion has just these."""
+    """Return the name of the criterion that the keys select; ValueError unless they are all keys of one criterion."""
     names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
         if names_given == list(names):

@@ -179,7 +179,7 @@ def aligned_cylinders(
 ) -> TransverseIsotropy:
     """Estimate the constants of cylinders in a reference medium under equal far fields.
 
-    With fractions c, moduli `surroundings` = (k0, m0, p0), x_i = k_i + m0, h0 = k0 m0/(k0 + 2 m0), composite values *,
+    With fractions c, `surroundings` (k0, m0, p0), x_i = k_i + m0, h0 = k0 m0/(k0 + 2 m0), and * for the composite,
 
         1/(k* + m0) = sum c/x,  1/(m* + h0) = sum c/(m + h0),  1/(p* + p0) = sum c/(p + p0),
         l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
