@@ -231,7 +231,7 @@ class Homogenization:
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest weight in int eps* of nodes inside subdomains / sqrt(area); 0 for closed meshes.  Collective."""
+        """The largest weight of nodes inside subdomains in int eps* / sqrt(area); 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))

@@ -240,7 +240,7 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Compare distances of fibres, `centres` (n, 2) and `radii` (n,), with the matched table; None without a table."""
+    """Return the error of neighbour distances of fibres (n,) against the matched table; None without a table."""
     if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import fibre_pattern, random_fibres  # imports the statistics of neighbours

@@ -148,7 +148,7 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return (k,) the largest of 0 and `values` (k,) on each node's interface, over all ranks.  Collective."""
+        """Return, for each node, the largest of 0 and `values` (k,) on its interface over all ranks.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -213,7 +213,7 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the largest imposed strain of loads `strain` (v,) over that of `asked` (v,); 0 if `asked` is zero."""
+        """Return the ratio of the largest imposed strains of `strain` (v,) and `asked` (v,); 0 if `asked` is zero."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:

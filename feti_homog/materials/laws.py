@@ -230,7 +230,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
 
 
 def missing_constants(form: type[Any], names: Collection[str], plane: str) -> list[str]:
-    """List faults, one a line: constants that a form needs in a mechanical plane state, but lacks among `names`."""
+    """List faults, one a line: constants that a form needs in a mechanical plane state, and `names` does not have."""
     state, faults = voigt.PLANE_STATES[plane], []
     if form is material_forms.TransverselyIsotropic and not {"nu_transverse", "G_transverse"} & {*names}:
         faults.append("nu_transverse, G_transverse: missing; expected one")
@@ -259,7 +259,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
-    """Return Poisson's ratio across the fibres; ValueError unless either nu_transverse or G_transverse is given."""
+    """Return Poisson's ratio across the fibres; ValueError unless one of nu_transverse, G_transverse alone is given."""
     ratio, shear = material.nu_transverse, material.G_transverse
     if ratio is not None and shear is None:
         return ratio

@@ -130,7 +130,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate the table `constants` along dC and dthermal; unless both thermal stresses exist, along dC alone."""
+    """Differentiate the table `constants` along dC and dthermal; without both thermal arguments, along dC alone."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

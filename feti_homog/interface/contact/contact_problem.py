@@ -113,7 +113,11 @@ class ContactProblem:
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return statuses (k,) after bonds `which` part to OPEN or, pressed (`lam` < 0) with `contact`, to CLOSED."""
+        """Return the statuses (k,) after the bonds in the mask `which` (k,) part.
+
+        With `contact`, nodes whose normal multiplier in `lam` (owned rows,) is negative, a pressure, become CLOSED; all
+        other parted nodes become OPEN.
+        """
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)

@@ -4,9 +4,10 @@ Phases are symmetric about x3 = 0, so the problems share only the bonds: the pla
 debonded node carries no traction along the fibre.
 
 The damaged fraction of a bond has friction (Alfano & Sacco, 2006).  At damage d, slip s and stiffness K, the fraction
-1 - d bears (1 - d) K s, and the fraction d bears f = K (s - s_i), bounded by Coulomb's law with full pressure.  With
-g = d s_i and spring compliances C, intact C_0, the bond is the intact spring in series with a face with the jump g, the
-spring 1 / (C - C_0) and the force f: lam = g / (C - C_0) + f, s = C_0 lam + g.  `DualSolution.jump` is r = s - C lam.
+1 - d bears (1 - d) K s.  The fraction d slides by s_i and bears f = K (s - s_i), bounded by Coulomb's law with the full
+pressure.  With g = d s_i and spring compliances C, intact C_0, the bond is the intact spring in series with a face with
+the jump g, the spring 1 / (C - C_0) and the force f: lam = g / (C - C_0) + f, s = C_0 lam + g.  `DualSolution.jump` is
+r = s - C lam.
 """
 
 from collections.abc import Sequence

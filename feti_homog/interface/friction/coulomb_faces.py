@@ -57,10 +57,7 @@ class CoulombFaces(FaceSystem):
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Find the next statuses (n,) and the rate (m,) of the state x under a load rate (v,).
-
-        Raises NotCarriedError and StuckError as `step` does.
-        """
+        """Find the next statuses (n,) and the rate (m,) of x under a load rate (v,).  Raises as `step` does."""
         load, status, start = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status), np.zeros(len(x))
         noise = self.noise(x)
         allowed = self._at_limits(status, x, noise)

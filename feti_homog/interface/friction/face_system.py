@@ -72,7 +72,7 @@ class FaceSystem:
         return f[self.gaps], f[self.slips]
 
     def rooms(self, status: Status, x: Float, slip: Float | float, pressure: Float | float) -> Float:
-        """Return the force or jump (4, n) left to each node before a direct change to each status; inf if not direct.
+        """Return the force or jump (4, n) that separates each node from each next status; inf if none leads there.
 
         The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with added
         pressure; g_n is the room of an open node, in the row STICK.
@@ -91,7 +91,7 @@ class FaceSystem:
         )
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the followed response of `before`, then useless, if `FollowedStatuses.grow` can extend it."""
+        """Take over the response of `before`, which is then useless, if `FollowedStatuses.grow` can extend it."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored

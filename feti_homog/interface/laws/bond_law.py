@@ -47,7 +47,7 @@ class SectionValues:
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """Return the first value that each of s sections sets (s,), without factors; (inf,) without sections."""
+        """Return the value (s,) of the first key set in each of s sections, without factors; (inf,) for no sections."""
         values = []
         for bond in self.bonds:
             candidates = [getattr(bond, name) for name in (key, *more)]
@@ -219,6 +219,6 @@ def law_class(name: str) -> type[BondLaw]:
 
 
 def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law of sections at nodes from the arguments of `SectionValues`; without sections none breaks."""
+    """Make the bond law at nodes from the arguments of `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))

@@ -86,7 +86,7 @@ class SpringEnergy(SpringLaw):
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The data that give released energies at this rank's t debonding tips: intact bonds beside broken bonds.
+    """Data for the released energies at this rank's t debonding tips, which are intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
@@ -105,7 +105,7 @@ class TipEnergies:
 class ReleasedEnergy(SpringEnergy):
     """The law in which bonds at tips break by the released energy.
 
-    A bond at a tip breaks when its break releases G_c l, with tributary length l; another bond breaks when its spring
+    A bond at a tip breaks when its break releases G_c l, with tributary length l; other bonds break when their spring
     energy reaches G_c.
 
     Attributes:

@@ -142,10 +142,7 @@ class CohesiveLaw(SpringLaw):
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
-        """Return the utilisation sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth.
-
-        The utilisation is homogeneous of degree one because B is independent of the size of the traction.
-        """
+        """Return the utilisation sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth."""
         first, second = self.energies(traction)
         tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
