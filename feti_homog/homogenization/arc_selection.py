@@ -25,7 +25,7 @@ TIP_TRIANGLES = 2.0
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return sorted tip directions (degrees) by curve: n for the outline of fibre n (from 0), ~n within its coating."""
+    """Return sorted tip directions by curve, in degrees: n is the outer curve of fibre n from 0, ~n the inner one."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         ends = {phase_names.COATING, phase_names.MATRIX} & {*(interface.between or ())}

@@ -207,7 +207,7 @@ class Homogenization:
         return float(error / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
-        """Count the nodes of all ranks in each contact state: `bonded`, `open` and `closed`.  Collective."""
+        """Count interface nodes on all ranks by contact state: `bonded`, `open`, `closed`.  Collective."""
         if self.cell.summary.across:  # without multipliers no bond can break
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])

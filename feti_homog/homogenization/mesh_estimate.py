@@ -69,7 +69,7 @@ class EnergyErrors:
 
     @property
     def absolute(self) -> Float:
-        """The estimate (k, k) of |computed - exact|, at least a fraction of its parts."""
+        """The estimate (k, k) of |computed - exact|, at least a fraction of the sizes of `elements` and `arcs`."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
         fraction = np.full((len(size),) * 2, self.least_of_two)
         np.fill_diagonal(fraction, LEAST_SHARE)

@@ -125,8 +125,9 @@ def has_springs(case: Case) -> bool:
 def strength_factors(case: Case, fibres: int) -> Float:
     """Return the ratios (fibres,) of the bond strength of each fibre to the strength in the case.
 
-    With scatter a ratio is (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution, modulus m, mean
-    1), times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th random number.
+    A ratio is 1 or, with scatter, (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution with
+    modulus m, mean 1), times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th random
+    number.
     """
     factors = np.ones(fibres)
     scatter = case.interface.scatter if case.interface else None

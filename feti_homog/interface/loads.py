@@ -174,7 +174,7 @@ class LoadScales:
 
     @property
     def sign_noise(self) -> float:
-        """The relative size of forces, gaps and stiffnesses up to which they may be the solver's error."""
+        """The relative size up to which forces, gaps and stiffnesses may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:

@@ -203,7 +203,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisations (n, modes), at least 0, of a valid strength; Hashin has four modes, others one.
+    """Compute utilisations (n, modes), at least 0, of a valid strength: four modes by Hashin, one by other criteria.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.

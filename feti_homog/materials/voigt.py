@@ -60,7 +60,7 @@ class PlaneState:
 
     @property
     def normals(self) -> int:
-        """The number of normal strains among the components; they come first."""
+        """The number of normal strains, which come first among the components."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 

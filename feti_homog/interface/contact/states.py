@@ -128,7 +128,7 @@ class Equilibrium:
 def kkt_errors(
     scales: LoadScales, traction: Float, gap: Float, debonded: Bool, closed: Bool, acting: Float
 ) -> dict[str, float]:
-    """Measure the largest relative violations of the KKT conditions on debonded faces.  Collective.
+    """Measure the largest violations of the KKT conditions on debonded faces, absolute if no load acts.  Collective.
 
     `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
     the normal traction of a closed node relative to the largest traction on the interface.  `kkt_complementarity`

@@ -37,7 +37,7 @@ class CondensedProblem:
     """
 
     def __init__(self, interface: ContactProblem) -> None:
-        """Compute the response of the bonded cell to unit loads.  Collective; raises CaseError without an inverse."""
+        """Compute the bonded cell's response to unit loads.  Collective; raises CaseError without an `ExactInverse`."""
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
             raise CaseError(solver_plan.WITHOUT_INVERSE)

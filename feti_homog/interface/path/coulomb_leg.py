@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the leg fraction that the cell carries and the error beyond it; (`share`, None) if stuck."""
+            """Return the leg fraction that the cell carries, and the error beyond it or None; `share` if stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

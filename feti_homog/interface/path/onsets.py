@@ -50,8 +50,8 @@ class Onset:
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
         """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf if none does.
 
-        Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations
-        under `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
+        Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations under
+        `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after the first may have inf.
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))

@@ -27,9 +27,9 @@ def events(
 ) -> Iterator[Point]:
     """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a point
-    precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with `broke` = 0;
-    the response is straight up to a point, from the state after the last break.  A point without convergence is the
+    A leg begins with the strains or stresses of the previous state, as the leg's waypoint prescribes.  The state of a
+    point precedes its break.  On later legs, and with friction on all legs, contact changes are points, too (`broke` =
+    0); the response is straight up to a point, from the state after the last break.  A point without convergence is the
     last one.  Raises NotCarriedError if the cell carries no more load; the last point is at the largest load.
     """
     for leg in range(begin.leg, len(waypoints)):

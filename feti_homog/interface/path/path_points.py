@@ -40,7 +40,7 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies between the last point and the state `after`; only a break at this point loses energy."""
+        """Return the energies from the last point to the state `after`; only a break at the last point loses any."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
