@@ -115,7 +115,7 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     """List remarks on a case: missing expansions, the boundary, element order, scatter, teeth and fibre fraction.
 
-    Without periodic sides the list ends at the boundary.  `bonds` is the number of bonds with teeth, 0 if unknown.
+    Unless sides are periodic, only the first two are checked.  `bonds` is the number of bonds with teeth, or 0.
     """
     cell, lines = case.cell, list[str]()
     missing = [name for name, material in case.materials.items() if laws.expansion(material) is None]
@@ -168,8 +168,8 @@ def process_zone(case: Case) -> tuple[float, float]:
     """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
     Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c are the
-    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state, E / (1 -
-    nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds at least 100 times as
+    toughness and strength in the pure mode with the shorter zone.  E' is the Young's modulus of the plane state (E / (1
+    - nu^2) in plane strain) along the most compliant axis of the most compliant phase.  Bonds at least 100 times as
     strong as the weakest bond hold, and do not count.
     """
     pure = []

@@ -35,7 +35,7 @@ class RecoveredFields:
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
-        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, - flux at 13, 23, 33.
+        stress: (s, 6, e) element means of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux at 13, 23 and 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
             hydrostatic stress is a third of the trace.  Phases without a determined S33, or in conduction, are absent.
     """

@@ -60,7 +60,7 @@ class TornCell:
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """The one-body parts of this rank's subdomains, numbered over all ranks.  Collective when first read."""
+        """The one-body parts, numbered over all ranks, of this rank's subdomains.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:

@@ -178,7 +178,7 @@ def _angle(material: material_forms.Material) -> float:
 
 
 def _checked_stiffness(material: material_forms.General) -> Float:
-    """Return the given stiffness, (3, 3) or (6, 6), made symmetric with exact zeros; ValueError for an invalid one."""
+    """Return the given stiffness, (3, 3) or (6, 6), exactly symmetric, with zero COUPLINGS; ValueError if invalid."""
     stiffness = _symmetric("stiffness", material.stiffness)
     noise = NOISE * np.abs(stiffness).max()
     if len(stiffness) == 6:

@@ -84,7 +84,7 @@ class Fibres:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The constants by one method; null where the method gives no value."""
+    """The constants by one method; None, which is null in results, where the method gives no value."""
 
     E_axial: float | None = described("Young's modulus along the fibres", records.STRESS)
     E_transverse: float | None = described("Young's modulus across the fibres", records.STRESS)

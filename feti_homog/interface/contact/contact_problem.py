@@ -226,7 +226,7 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective.
+        """Move free fibres to open all overlaps, and mark open nodes (k,) that squeeze a fibre.  Collective.
 
         Return the solution with new alpha and jumps, and the mask (k,).  Raises like `FloatingBodies.place`.
         """

@@ -45,7 +45,8 @@ class _Fibres:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node, open or not.
-        fibre: (k,) number of the fibre; a fibre and its coating share a number, and so do neighbouring layers.
+        fibre: (k,) number of the fibre; bodies that share an interface, such as a fibre and its coating, share a
+            number.
     """
 
     is_open: Bool

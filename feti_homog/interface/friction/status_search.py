@@ -71,10 +71,10 @@ class StatusSearch:
     def by_lemke(self) -> Found:
         """Search by Lemke's method: admissible statuses under an added pressure that falls to zero.
 
-        At a large pressure t d, d random, all faces allowed to touch are STICK or, without friction, FORWARD.  As t
-        falls, nodes change their statuses one by one; after a change t goes on, down or up, as the new status admits.
-        At the end det M >= 0 (`status_system`).  None if t rises without end, after SOLVES + 4 n changes, or as in
-        `_balanced`.
+        The added pressure is t d, with random d by node.  At large t, all faces allowed to touch are STICK or, without
+        friction, FORWARD.  As t falls, nodes change their statuses one by one; after a change t goes on, down or up, as
+        the new status admits.  At the end det M >= 0 (`status_system`).  Returns None if t rises without end, after
+        SOLVES + 4 n changes, or as in `_balanced`.
         """
         faces, load, rest = self.faces, self.load, np.zeros(len(self.start))
         # Nodes of a symmetric cell would reach limits together under equal pressures.
@@ -114,7 +114,7 @@ class StatusSearch:
         return result if balanced else None
 
     def _rooms(self, status: Status, x: Float, pressure: Float | float = 0.0) -> Float:
-        """Return `FaceSystem.rooms` (4, n) before changes to allowed statuses; inf for other statuses."""
+        """Return the `FaceSystem.rooms` (4, n) up to allowed statuses; inf up to other statuses."""
         enters = self.allowed.T.copy()
         enters[STICK] |= self.allowed[:, FORWARD]  # an open face without friction closes to FORWARD
         return np.where(enters, self.faces.rooms(status, x, self.load.slip, pressure), np.inf)

@@ -48,7 +48,7 @@ class Onset:
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf if none does.
+        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf without a break.
 
         Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations under
         `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after the first may have inf.
