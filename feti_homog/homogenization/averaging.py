@@ -70,7 +70,7 @@ class Response:
 
     @property
     def all_loads(self) -> Float:
-        """All loads of the response, the entries of `DualSolution.strain`, times `scale`."""
+        """All loads (v,) of the response times `scale`, with all entries of `DualSolution.strain`."""
         return self.scale * self.state.solution.strain
 
     @property

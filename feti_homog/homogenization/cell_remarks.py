@@ -168,9 +168,9 @@ def process_zone(case: Case) -> tuple[float, float]:
     """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
     Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c are the
-    toughness and strength in the pure mode with the shorter zone.  E' is the Young's modulus of the plane state (E / (1
-    - nu^2) in plane strain) along the most compliant axis of the most compliant phase.  Bonds at least 100 times as
-    strong as the weakest bond hold, and do not count.
+    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state, equal to
+    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds at least 100 times
+    as strong as the weakest bond hold, and do not count.
     """
     pure = []
     for bond in case.interfaces:

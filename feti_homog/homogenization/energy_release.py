@@ -272,7 +272,7 @@ class TipZones:
         return work, length
 
     def gathered(self, values: Array) -> Array:
-        """Concatenate arrays of all ranks, such as the values at interface nodes, by rank.  Collective."""
+        """Concatenate rows (n, ..) of all ranks, such as the values at interface nodes, by rank.  Collective."""
         return np.concatenate(self.cell.comm.allgather(values))
 
 

@@ -86,7 +86,7 @@ class Load:
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
-        """Split the load into consecutive loads, each with as many components as `sizes` tells."""
+        """Split the load into consecutive loads with the numbers of components in `sizes`."""
         ends = np.cumsum(sizes)[:-1]
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 

@@ -192,7 +192,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
-    """Return the symmetric part of a matrix.  Raises ValueError for a relative asymmetry above NOISE."""
+    """Return the symmetric part of a matrix (n, n).  Raises ValueError for a relative asymmetry above NOISE."""
     matrix = np.array(rows)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
         raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
@@ -200,7 +200,7 @@ def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
 
 
 def _positive_definite(name: str, matrix: Float) -> Float:
-    """Return the matrix unchanged.  Raises ValueError unless it is positive definite."""
+    """Return the symmetric matrix (n, n) unchanged.  Raises ValueError unless it is positive definite."""
     if not voigt.is_positive_definite(matrix):
         raise ValueError(f"{name} = {wording.toml_value(matrix.tolist())}: expected a positive definite matrix")
     return matrix

@@ -72,7 +72,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC = -C dS C for each engineering constant.  S is the plane state's compliance."""
+    """Yield name, value and dC = -C dS C (n, n) for each engineering constant.  S is the plane state's compliance."""
     skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -90,7 +90,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC for entries of a given stiffness except COUPLINGS; entries ij and ji change together."""
+    """Yield name, value and dC (n, n) for entries ij = ji of a given stiffness except COUPLINGS."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:
@@ -117,7 +117,7 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Return the derivative of M, a stiffness or compliance with an imaginary step, in a plane state.
+    """Return the derivative (n, n) of M, a stiffness or compliance with an imaginary step, in a plane state.
 
     A spatial state takes all of M, a plane state a block; component 33 is eliminated if the state is `condensed`.
     """

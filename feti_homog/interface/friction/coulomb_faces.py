@@ -57,7 +57,10 @@ class CoulombFaces(FaceSystem):
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Find the next statuses (n,) and the rate (m,) of x under a load rate (v,).  Raises as `step` does."""
+        """Find the next statuses (n,) and the rate (m,) of x under a load rate (v,).  Raises as `step` does.
+
+        A second search, if the first fails, also takes faces of a nearly unloaded cell for faces at limits.
+        """
         load, status, start = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status), np.zeros(len(x))
         noise = self.noise(x)
         allowed = self._at_limits(status, x, noise)
@@ -86,7 +89,7 @@ class CoulombFaces(FaceSystem):
         return True
 
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Find admissible statuses for which det M is not negative, and x; arguments as in `search`.
+        """Find admissible statuses (n,) for which det M is not negative, and x (m,); arguments as in `search`.
 
         A pinched fibre jams if all faces that pinch it stick, and snaps through, with a negative stiffness, if one of
         these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as `step` does.

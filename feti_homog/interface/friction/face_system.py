@@ -111,7 +111,7 @@ class FaceSystem:
         return self.keep(x, self.S @ x)
 
     def keep(self, x: Float, y: Float) -> Float:
-        """Store y as the product S x, and return y."""
+        """Store y (m,) as the product S x, and return y."""
         self._products.append((x, y))
         return y
 

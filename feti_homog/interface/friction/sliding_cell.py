@@ -228,7 +228,7 @@ class SlidingCell:
         return np.asarray(force / self.interface.nodes.length[:, None])
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
-        """Return each condensed problem with its unscaled jumps and strains in x."""
+        """Return each condensed problem with its unscaled jumps (n,) and strains (v,) in x."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
         axial = [(faces.problem, (faces.jumps @ along, along)) for faces in self._along]
         return [(self._plane, (jump, plane)), *axial]

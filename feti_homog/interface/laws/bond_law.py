@@ -124,10 +124,7 @@ class BondLaw(ABC):
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the fracture energies per area (p,) of the p bonds in the mask `which` (k,); 0 without toughness.
-
-        The tractions (k, c) determine the mode of each bond.
-        """
+        """Return the fracture energy per area (p,) of p bonds `which` (k,) at tractions (k, c); 0 without toughness."""
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:

@@ -123,11 +123,11 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
-        """Return the relative traction tau(u), which falls from 1, for u >= 0."""
+        """Return the relative traction tau(u) (p,) for u (p,) >= 0, which falls from 1 at u = 0."""
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral of tau from 0 to u."""
+        """Return the integral of tau from 0 to u, for one or many u (p,)."""
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
@@ -184,7 +184,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _onsets(self) -> tuple[float | Float, float | Float]:
-        """The onset energies W_n and W_t."""
+        """The onset energies W_n and W_t, numbers or (p,)."""
         normal, tangential = self.normal_strength, self.tangential_strength
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
@@ -226,11 +226,11 @@ class PiecewiseLinear(CohesiveLaw):
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
-        """Return the relative traction tau(u) for u >= 0."""
+        """Return the relative traction tau(u) (p,) for u (p,) >= 0."""
         return np.interp(u, self.knots, self.heights)
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral of tau from 0 to u."""
+        """Return the integral of tau from 0 to u, for one or many u (p,)."""
         u = np.minimum(u, self.last)
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
@@ -276,11 +276,11 @@ class ExponentialLaw(CohesiveLaw):
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
-        """Return the relative traction exp(-u)."""
+        """Return the relative traction exp(-u) (p,) for u (p,) >= 0."""
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral of tau from 0 to u: 1 - exp(-u)."""
+        """Return the integral of tau from 0 to u, 1 - exp(-u), for one or many u (p,)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
