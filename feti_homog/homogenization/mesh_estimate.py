@@ -1,6 +1,6 @@
 """Estimate the mesh error in the energy of each pair of responses by recovered stresses.
 
-The recovered stresses in a body satisfy the tractions at voids and at interfaces (multipliers divided by lengths).
+With linear elements, recovered stresses meet the tractions at voids and interfaces (multipliers divided by lengths).
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     """Mark the strains (v,) that prescribed stresses leave undetermined.  Collective.
 
     Under such a strain, rigid motions of the torn bodies close all active jumps, and the bodies bear no stress: only
-    debonded faces move apart.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is the cell area times <L>.
+    debonded faces move apart.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is area times mean stiffness.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]

@@ -23,9 +23,9 @@ MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
     """Estimate the constants of fibres in a matrix by each method, None where a method gives no value.
 
-    The rule of mixtures and Mori and Tanaka's estimate allow several kinds of fibres, the other methods one; only Mori
-    and Tanaka's, the cylinder and the self-consistent estimate allow springs.  No method gives a constant if a phase is
-    not transversely isotropic about x3, nor an expansion if a phase has no expansion.
+    The rule of mixtures and Mori and Tanaka's estimate allow several kinds of fibres, the other methods one; springs
+    are allowed by `mori_tanaka`, `composite_cylinders` and `self_consistent` alone.  No method gives a constant if a
+    phase is not transversely isotropic about x3, nor an expansion if a phase has no expansion.
     """
     able = set(METHODS)
     if any(family.springs is not None for family in fibres):

@@ -109,7 +109,7 @@ class ContactProblem:
         return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
-        """Mark the bonds (k,) whose normal springs damage has softened in tension."""
+        """Mark the bonds (k,) with normal springs that are softer in tension than in compression, due to damage."""
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
