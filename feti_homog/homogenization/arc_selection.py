@@ -1,4 +1,4 @@
-"""Find faults of debonded arcs in a cell, place the tips of arcs, and choose the element size at tips."""
+"""Find faults of debonded arcs in a cell, find the tips that the mesh places or moves, and size elements at tips."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TIP_TRIANGLES = 2.0
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Return the sorted tip directions in degrees by curve: fibre n from 0, or ~n for the curve within a coating."""
+    """Return sorted tip directions by curve, in degrees: n is the outer curve of fibre n from 0, ~n the inner one."""
     by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         ends = {phase_names.COATING, phase_names.MATRIX} & {*(interface.between or ())}
@@ -36,7 +36,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips / cell width; None for the size on interfaces.
+    """Return the element size at tips / cell width; None if the size on interfaces also holds at tips.
 
     Without `tip_size` in the case, the size follows from the ratio R of the mean fibre radius to the cell width,
 
@@ -60,9 +60,10 @@ def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None
 
 @dataclass(frozen=True)
 class EstimatedNodes:
-    """The interface nodes (k,) on rank 0 before refinement: fibre number from 1, interface, direction in degrees.
+    """The k interface nodes that the refined mesh will have, placed on straight coarse edges, on rank 0.
 
-    `is_vertex` (k,) marks vertices of coarse triangles.
+    All are (k,): `fibre` numbers from 1, interfaces `pair`, `direction` in degrees (NaN without a centre), and
+    `is_vertex`, which marks vertices of coarse triangles.
     """
 
     fibre: Int
@@ -72,9 +73,9 @@ class EstimatedNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
-        """Place nodes on the chords that may debond, except vertices that never part.
+        """Place nodes on the coarse edges that may debond, except vertices that never part.
 
-        `pairs` are as in `share_entities`; fibres have `numbers` (constituents,) and `centres` (constituents, 2).
+        `pairs` are as in `cell_remarks.pairs_of`; constituents (n,) have fibre `numbers` (n,) and `centres` (n, 2).
         """
         first, second, edge = torus.sides
         pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
@@ -93,7 +94,7 @@ class EstimatedNodes:
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return the tips that the mesher moved to vertices, one mapping per interface; empty in a user's mesh."""
+        """Return the tips that the mesher moved to vertices, by interface; a user's mesh has none: empty mappings."""
         if case.cell.has_own_mesh:
             return ({},) * len(case.interfaces)
         distance, moved = float(np.degrees(outline.MERGED)), []
@@ -107,7 +108,7 @@ class EstimatedNodes:
 def checked(
     case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
-    """Return the moved tips by interface, and the `faults` followed by faults of arcs.
+    """Return the moved tips by interface, and all faults: the given `faults`, then faults of arcs.
 
     Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
     select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.

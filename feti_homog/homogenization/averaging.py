@@ -64,13 +64,13 @@ class Response:
 
     @property
     def leading(self) -> str:
-        """The largest plane strain and its stress, in words."""
+        """The largest in-plane strain and the stress of this component, in words."""
         k = int(np.abs(self.strain[: len(voigt.STRAINS)]).argmax())
         return f"{voigt.STRAINS[k]} {self.strain[k]:.4g}, {voigt.STRESSES[k]} {self.stress[k]:.4g}"
 
     @property
     def all_loads(self) -> Float:
-        """The loads of the response: all entries of `DualSolution.strain`, scaled."""
+        """All loads (v,) of the response times `scale`, with all entries of `DualSolution.strain`."""
         return self.scale * self.state.solution.strain
 
     @property
@@ -86,7 +86,7 @@ class Response:
 
 
 class Homogenization:
-    """Averages over a torn `cell` with interfaces.
+    """Solve unit-cell problems on the torn `cell`, with contact of faces if `contact`, and average their fields.
 
     Attributes:
         law: bond law, without the energies released at tips; None without [interface].
@@ -207,7 +207,7 @@ class Homogenization:
         return float(error / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
-        """Count the nodes of all ranks in each contact state: `bonded`, `open` and `closed`.  Collective."""
+        """Count interface nodes on all ranks by contact state: `bonded`, `open`, `closed`.  Collective."""
         if self.cell.summary.across:  # without multipliers no bond can break
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (Contact.BONDED, Contact.OPEN, Contact.CLOSED)])
@@ -215,7 +215,7 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """The matrix nu = (B B^T)^-1 B N (owned rows, m): int eps* = N^T u = nu^T B u.  Collective when first read."""
+        """The matrix nu (owned rows, m) that gives int eps* = nu^T B u from jumps B u.  Collective when first read."""
         solver = self.cell.solver
         B = solver.interface_operators.B
         integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
@@ -224,14 +224,14 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """The matrix N (boundary dofs, m), with N^T u = int eps* over bodies and voids."""
+        """The matrix N (boundary dofs, m) that gives int eps* = N^T u, over bodies and voids, from displacements u."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
         return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest weight of inner nodes in int eps*, relative to sqrt(area); 0 for closed meshes.  Collective."""
+        """The largest weight of nodes inside subdomains in int eps* / sqrt(area); 0 for closed meshes.  Collective."""
         inner, size = 0.0, 0.0
         for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
@@ -249,10 +249,10 @@ class Homogenization:
 
 
 class FibreInterfaces:
-    """The interfaces of f fibres, by fibre number; a coated fibre may have two interfaces."""
+    """The interface lengths of f fibres, by fibre number; a coated fibre may have two interfaces."""
 
     def __init__(self, cell: TornCell) -> None:
-        """Sum all interface lengths.  Collective."""
+        """Sum the interface lengths of each fibre.  Collective."""
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
@@ -273,11 +273,11 @@ class FibreInterfaces:
         return [int(number) for number in np.flatnonzero(is_loose) + 1]
 
     def angle(self, length: Float) -> Float:
-        """Convert interface lengths (f,) to degrees; fractions of 360 unless fibres are round and uncoated."""
+        """Convert interface lengths (f,) to degrees: by the radius of round, uncoated fibres, else as shares of 360."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """Return the ratio of the summed lengths (f,) to the whole interface length; 0 without interfaces."""
+        """Return the sum of lengths (f,) over the interface length of all fibres; 0 without interfaces."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:
@@ -289,5 +289,5 @@ class FibreInterfaces:
 
 
 def asymmetry(L: Float) -> float:
-    """Return the relative asymmetry max |L - L^T| / max |L|."""
+    """Return the relative asymmetry max |L - L^T| / max |L| of a matrix L."""
     return float(np.abs(L - L.T).max() / np.abs(L).max())

@@ -38,7 +38,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
-    """List faults in `between` of interfaces; in the cell, phases `first` (n,) touch phases `second` (n,)."""
+    """List faults in the keys `between`, for a cell whose phases `first` (n,) touch the phases `second` (n,)."""
     lines, touching = list[str](), np.zeros((len(phases), len(phases)), bool)
     touching[first, second] = touching[second, first] = True
     for section, interface in interface_section.labelled(case.interfaces):
@@ -91,7 +91,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
 
 def cut_off(mesh: CoarseMesh, refine: int) -> float:
-    """Return the area fraction that straight edges cut off round fibres after `refine` halvings; 0 without arcs."""
+    """Return the fraction of fibre area that straight edges lose along arcs after `refine` halvings; 0 without arcs."""
     curves = mesh.ellipses[mesh.arc_circle]
     ends = np.linalg.solve(curves.frames, (mesh.points[mesh.arc_edges] - curves.centres[:, None]).swapaxes(1, 2))
     angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**refine
@@ -100,7 +100,7 @@ def cut_off(mesh: CoarseMesh, refine: int) -> float:
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Explain in one line why the subdomain count differs from the requested number; () without a difference."""
+    """Explain in one line why the subdomain count is not the requested number; () if it is, or without a request."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
@@ -113,9 +113,9 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
-    """List remarks on missing expansions, then on nonperiodic sides or else order, scatter, teeth and fibre fraction.
+    """List remarks on a case: missing expansions, the boundary, element order, scatter, teeth and fibre fraction.
 
-    `bonds` is the number of bonds with teeth, 0 if unknown.
+    Unless sides are periodic, only the first two are checked.  `bonds` is the number of bonds with teeth, or 0.
     """
     cell, lines = case.cell, list[str]()
     missing = [name for name, material in case.materials.items() if laws.expansion(material) is None]
@@ -146,7 +146,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
 
 
 def soft_springs(case: Case, radii: Float) -> list[str]:
-    """List springs of bonds that break, if they are too soft to represent rigid bonds.
+    """List springs that are too soft to represent rigid bonds, among the springs of bonds that can break.
 
     `radii` (f,) are fibre radii, NaN unless round.  The loss of stiffness grows with E' / (k r), the ratio of the
     matrix modulus in the plane state to spring stiffness and mean radius.  At 1 / 50, the limit of Turon et al. (Eng.
@@ -167,10 +167,10 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
 def process_zone(case: Case) -> tuple[float, float]:
     """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
 
-    Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c
-    are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state,
-    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds with 100 times
-    the strengths of others hold, without a process zone.
+    Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c are the
+    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state, equal to
+    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds at least 100 times
+    as strong as the weakest bond hold, and do not count.
     """
     pure = []
     for bond in case.interfaces:
@@ -192,7 +192,7 @@ def _modulus(case: Case, phase: str) -> float:
 
 
 def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
-    """List warnings about cohesive laws, unlikely process zones, and elements that do not resolve a process zone.
+    """List warnings about cohesive laws, unlikely lengths of process zones, and elements too long for a process zone.
 
     Args:
         width: cell width.
@@ -235,7 +235,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """List warnings about energies that depend on the order of modes, and about teeth above the peak traction."""
+    """List warnings about cohesive laws: energies depend on the order of modes, or teeth exceed the peak traction."""
     if not phase_laws.has_softening(case):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften

@@ -1,7 +1,7 @@
 """Find the vertices that pieces of a body share, sum values over pieces, and fit stresses across cuts.
 
-Each vertex and each coarse edge on a cut has a home rank, which knows all pieces with this vertex or edge.  An element
-patch about a shared vertex belongs to the body, not to a piece.
+Each vertex and each coarse edge on a cut has a home rank, which knows all pieces with this vertex or edge.  The patch
+of elements about a shared vertex extends over all pieces of the body.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class SharedVertices:
     """
 
     def __init__(self, comm: MPI.Intracomm, meshes: Sequence[tuple[Sequence[Submesh], FineMesh]]) -> None:
-        """Find the vertices and edges that several pieces share; `meshes` has pieces and their mesh.  Collective."""
+        """Find the vertices and edges that several pieces share, from the pieces and mesh in `meshes`.  Collective."""
         self._comm = comm
         # On the piece borders: vertices (n, 3) by body, entity and position, their classes (n,), coarse edges (e, 3) by
         # body, entity and position, and the vertex classes (e, m) along these edges.
@@ -83,7 +83,7 @@ class SharedVertices:
         return self._at_home(self._rows, np.concatenate([np.zeros((0, width)), *parts]), self.classes, sums)
 
     def _copies(self, parts: Sequence[Int]) -> list[Int]:
-        """Count, for each part (n, 3), the copies of its rows, and mark first copies with 1: (n, 2).  Collective."""
+        """Count the copies of each row in `parts` (n, 3) on all ranks, and mark first copies: (n, 2).  Collective."""
 
         def copies(number: Int, _: Int) -> Int:
             _, first, count = np.unique(number, return_index=True, return_counts=True)
@@ -115,8 +115,8 @@ def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, 
     """Find the triangles and edges along the border of a piece.
 
     `classes` (t, q) are the lattice node classes of all triangles.  Return the triangle (e,) at each border edge, the
-    position (e,) of the edge in the triangle, and the node classes (e, intervals + 1) along the edge, in the same order
-    on both sides of a cut.
+    position (e,) of the edge in the triangle, and node classes (e, intervals + 1) along the edge, in one order for both
+    pieces.
     """
     edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
     triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
@@ -197,7 +197,7 @@ class _Strip:
         return cls(stress, is_vertex, stress.numbers[classes], sides[index], vector[index], np.unique(sides[single]))
 
     def neighbours(self, at_boundary: Bool) -> local_fits.PatchNeighbours:
-        """Pair vertices on the body boundary with neighbours; `at_boundary` (n,) marks shared boundary vertices."""
+        """Pair boundary vertices with neighbours; `at_boundary` (n,) marks shared vertices on the body's boundary."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary

@@ -1,4 +1,4 @@
-"""Cut the cell on rank 0, from the coarse mesh to the submeshes of each rank."""
+"""Cut the cell on one rank: from the coarse mesh to the submeshes of each rank, with a summary of the cell."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -224,7 +224,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> partition.Partition | None:
-    """Cut the cell across materials; return None if the case, the policy or METIS prevents the cut."""
+    """Cut the cell across materials; None if the case or the policy does not allow it, or METIS leaves ranks empty."""
     elements, corners = torus.mesh.triangles.shape
     dofs, is_image = elements * (corners - 2) * lattice.intervals**2, corners == 4
     pieces = policy.across_pieces(dofs, n_ranks, is_image) if can_be_cut_across(case) else 0
@@ -240,7 +240,7 @@ def _cut_across(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the distance of fibres, `centres` (n, 2) and `radii` (n,), from the matched table; None without it."""
+    """Return the error of neighbour distances of fibres (n,) against the matched table; None without a table."""
     if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import fibre_pattern, random_fibres  # imports the statistics of neighbours

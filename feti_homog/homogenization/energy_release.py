@@ -75,7 +75,7 @@ class EnergyRelease:
 
 
 class TipZones:
-    """The zones about the tips of arcs on circles, in one problem of a torn cell.
+    """The zones about tips of arcs on circles in which mesh nodes turn or move apart, in one problem of a torn cell.
 
     Attributes:
         cell, chains: torn cell, and chains of interface nodes.
@@ -121,13 +121,13 @@ class TipZones:
         self._boundaries = self.gathered(np.concatenate(points)), self.gathered(np.concatenate(body))
 
     def tips(self, response: Response) -> debonded_arcs.CrackTips:
-        """Return the tips on circles of a response, by fibre, interface and direction.  Collective."""
+        """Return a response's tips on circular interfaces, sorted by fibre, interface and direction.  Collective."""
         tips = self.chains.tips(self.gathered(response.state.status))
         order = np.lexsort((self.direction[tips.node], self.pair[tips.node], self.fibre[tips.node]))
         return tips.chosen(order[np.isfinite(self.radius[tips.node[order]])])
 
     def reach(self, tips: debonded_arcs.CrackTips) -> Float:
-        """Return the radii (t,) of zones without other tips, and without boundaries except the circles of the tips."""
+        """Return zone radii (t,) about tips: no other tip, and no boundary but the tip's circle, lies in a zone."""
         bodies, position, spokes = self.bodies[tips.node], self.points[tips.node], self.spokes[tips.node]
         (points, body), period = self._boundaries, self.period
         radius, wrapped = np.linalg.norm(spokes, axis=1), in_cell(position, period)
@@ -142,7 +142,7 @@ class TipZones:
         return np.asarray(reach)
 
     def singular(self, response: Response) -> tuple[debonded_arcs.CrackTips, Float]:
-        """Return the tips of rigid bonds, and the radii (t,) of zones with few elements about them.  Collective."""
+        """Return the tips of rigid bonds, and radii (t,) of zones a few elements wide about each tip.  Collective."""
         tips, nodes = self.tips(response), self.cell.solver.jump_operator.nodes
         rows = nodes.row[:, None] + np.arange(self.cell.solver.problem.components)
         is_rigid = self.gathered((response.state.solution.compliance[rows] == 0.0).all(axis=1))
@@ -152,7 +152,10 @@ class TipZones:
         return tips, np.minimum(self.reach(tips), SINGULAR * length)
 
     def weights(self, points: Float, tips: debonded_arcs.CrackTips, reach: Float) -> Float:
-        """Return the weights 1 - q - (1 + order) r dq/dr of errors of elements at `points` (e, 2), 1 beyond zones."""
+        """Return weights (e,) of element errors at `points` (e, 2), to which `energy_changes` of growing zones add.
+
+        The weight is 1 - q - (1 + order) r dq/dr at the distance r from a tip, and so 0 in cores and 1 beyond zones.
+        """
         weights, factor, centres = np.ones(len(points)), 1 + self.cell.case.cell.order, self.points[tips.node]
         tree = cKDTree(in_cell(points, self.period), boxsize=self.period)
         inside = tree.query_ball_point(in_cell(centres, self.period), reach)
@@ -166,9 +169,9 @@ class TipZones:
     def energy_changes(
         self, tips: debonded_arcs.CrackTips, reach: Float, responses: Sequence[Response], grows: bool = False
     ) -> Float:
-        """Return derivatives (t, k, k) of twice the energies by the turn or growth of each tip's mesh.  Collective.
+        """Differentiate twice the energies of k responses by the turn of each tip's mesh: (t, k, k).  Collective.
 
-        If the mesh `grows`, distances from the tip grow, along the circle and across it.  Nodes beyond `reach` rest.
+        If the mesh `grows` instead, distances to the tip grow, along the circle and across.  Nodes beyond `reach` rest.
         """
         responses, k = with_displacements(self.cell, responses), len(responses)
         u = np.stack([response.inside for response in responses], axis=1)
@@ -184,7 +187,7 @@ class TipZones:
     def _energy_change(
         self, tip: int, reach: float, part: UniformPart, nodes: Int32, u: Float, loads: Float, grows: bool
     ) -> Float:
-        """Return the contribution (k, k) of elements with `nodes` (e, a), under u* (dofs, k) and loads (v, k)."""
+        """Return the part (k, k) of `energy_changes` in elements with `nodes` (e, a), u* (dofs, k) and loads (v, k)."""
         problem, spoke, points = part.problem, self.spokes[tip], part.mesh.points[nodes]
         offset = nearest_image(points - self.points[tip], self.period)
         # All nodes of an element take the image of the element's node that is nearest to the tip.
@@ -203,7 +206,7 @@ class TipZones:
         return fields.change(part.L, loads[problem.strains :], moved, changed)
 
     def release(self, response: Response, interface: ContactProblem) -> EnergyRelease:
-        """Return the energy release rates at all tips of a response to a contact problem.  Collective."""
+        """Return the energy release rates at all tips of a response to the contact problem `interface`.  Collective."""
         solution, in_plane = response.solution, self.cell.solver.problem.turns
         tips, status = self.tips(response), self.gathered(response.state.status)
         jump = self.gathered(interface.jump(solution))
@@ -225,7 +228,7 @@ class TipZones:
         return EnergyRelease(fibre=fibre, pair=pair, direction=direction, modes=modes, length=length)
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response, springs: Float) -> Float:
-        """Return G (t,) by a virtual crack extension at each tip.  Collective.
+        """Return energy release rates G (t,), by a virtual crack extension at each tip.  Collective.
 
         `springs` (n,) are the energies per length of elastic bonds at the interface nodes.
         """
@@ -246,8 +249,7 @@ class TipZones:
     def _closing(self, tips: debonded_arcs.CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """Return the work that closes each crack, from forces and jumps (n, c), and the closed lengths (t,).
 
-        The work is `closing_work` (t, c).  A closed length is the larger of MODE_LENGTH times the radius and the length
-        of the element behind the tip.
+        The work is `closing_work` (t, c).  A closed length is MODE_LENGTH times the radius, but at least one element.
         """
         least, order = MODE_LENGTH * self.radius[tips.node], self.cell.case.cell.order
         work, length = np.zeros((len(least), jump.shape[1])), np.zeros(len(least))
@@ -270,7 +272,7 @@ class TipZones:
         return work, length
 
     def gathered(self, values: Array) -> Array:
-        """Gather rows, such as the values at interface nodes, from all ranks.  Collective."""
+        """Concatenate rows (n, ..) of all ranks, such as the values at interface nodes, by rank.  Collective."""
         return np.concatenate(self.cell.comm.allgather(values))
 
 
@@ -280,5 +282,5 @@ def nearest_image(offset: Float, period: Float) -> Float:
 
 
 def turning_fraction(offset: Float, reach: float) -> Float:
-    """Return the factors q (..) at offsets (.., 2) from a tip: 1 in the core, 0 beyond `reach`."""
+    """Return the fractions q (..) of a motion at offsets (.., 2) from a tip: 1 in the core, 0 beyond `reach`."""
     return np.asarray(np.clip((reach - np.linalg.norm(offset, axis=-1)) / (reach * (1 - CORE)), 0.0, 1.0))

@@ -1,6 +1,6 @@
 """Estimate the mesh error in the energy of each pair of responses by recovered stresses.
 
-The recovered stresses in a body satisfy the tractions at voids and at interfaces (multipliers divided by lengths).
+With linear elements, recovered stresses meet the tractions at voids and interfaces (multipliers divided by lengths).
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ class EnergyErrors:
 
     @property
     def least(self) -> Float:
-        """The smallest error (k, k) if `elements` and `arcs` of opposite signs cancel."""
+        """The least sizes (k, k) of signed errors, in case `elements` and `arcs` of opposite signs cancel."""
         return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
     def absolute(self) -> Float:
-        """The estimate (k, k) of |computed - exact|."""
+        """The estimate (k, k) of |computed - exact|, at least a fraction of the sizes of `elements` and `arcs`."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
         fraction = np.full((len(size),) * 2, self.least_of_two)
         np.fill_diagonal(fraction, LEAST_SHARE)
@@ -86,9 +86,9 @@ def energy_errors(
     """Estimate the mesh errors of k responses in one problem.  Collective.
 
     Args:
-        responses, contact: the responses, all to the same intact bonds, and whether faces touch.
+        responses, contact: the responses, all with the same intact bonds, and whether faces touch.
         nested: whether to use the coarser mesh; by default the result of `is_nested`.
-        zones: about the tips of debonded responses; found here by default.
+        zones: zones about the tips of debonded responses; found here by default.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
@@ -211,7 +211,7 @@ def _recovered(
 class Group(NamedTuple):
     """The recovered stresses and arc sides of a subdomain group.
 
-    `place` (classes,): position among the displacements on all boundaries (across materials, in all parts), or NONE.
+    `place` (classes,) are positions among displacements on all boundaries (across materials, in all parts), or NONE.
     """
 
     stress: stress_recovery.RecoveredStress

@@ -51,8 +51,7 @@ class PartitionPolicy:
     """The rules for default piece counts.  Sizes are degrees of freedom after refinement.
 
     Attributes:
-        piece_dofs: piece size; smaller pieces make the coarse problem slower, larger ones the factors and the dense
-            matrices.
+        piece_dofs: piece size; smaller pieces slow down the coarse problem, larger ones the factors and dense matrices.
         piece_boundary_dofs: largest boundary between a piece and other bodies; for pieces in narrow bodies.
         cut_factor: ratio of a bonded body to a piece, by size or boundary, above which the body is cut.
         even_cut_factor, even_share: `even_cut_factor` replaces `cut_factor` for bodies up to the fraction `even_share`
@@ -88,7 +87,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
-        """Return the piece count across materials of a cell or image, a multiple of `n_ranks`; 0 for cuts by body."""
+        """Return the number of pieces across materials, a multiple of `n_ranks`; 0 if the cell is to be cut by body."""
         if not self.across_dofs or (dofs > self.across_dofs and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -153,7 +152,7 @@ def wanted_pieces(
 
 
 def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """Estimate the number of dual operator applications; `across` means that pieces reach across phases."""
+    """Estimate how often a run applies the dual operator of a problem; `across` if pieces reach across phases."""
     has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # the mesh may have a curve "debonded"
     touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
     contact = touches and problem.turns  # in axial shear no faces touch
@@ -199,7 +198,7 @@ def memory_to_the_end(case: Case, before: float, multipliers: int, columns: int,
 
 
 def recommended_ranks(dofs: int, bodies: int) -> int:
-    """Return the largest useful rank count of a cell.
+    """Return the largest useful number of ranks for a cell with `dofs` degrees of freedom.
 
     The number is at most the number of bodies, because more ranks would cut bodies, which costs iterations.  In cells
     that are cut across materials, `bodies` counts coarse triangles.

@@ -51,7 +51,7 @@ def law(case: Case, phase: str, problem: Problem) -> Float:
 
 
 def law_derivatives(case: Case, phase: str, dC: Float, expansion: Float) -> tuple[Float, ...]:
-    """Differentiate `law` in each of the `problems`: one or two derivatives (v, v).
+    """Differentiate `law` with respect to a phase constant, in each of the `problems`: one or two derivatives (v, v).
 
     `dC` is the derivative of the phase stiffness, (3, 3) or (6, 6), or conductivity; `expansion` (6,) is d alpha.
     """
@@ -91,7 +91,7 @@ def components(plane: Float, *axial: Float) -> Float:
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
-    """Join the components of the problems, or of conduction, to a vector (6,); None is zero."""
+    """Join components of the plane and the axial problem (or conduction) to a vector (6,); None counts as zero."""
     vector = np.zeros(6)
     if plane is not None:
         vector[IN_PLANE] = plane[:4]
@@ -123,10 +123,11 @@ def has_springs(case: Case) -> bool:
 
 
 def strength_factors(case: Case, fibres: int) -> Float:
-    """Return the ratios (fibres,) of fibre bond strengths to the strength in the case.
+    """Return the ratios (fibres,) of the bond strength of each fibre to the strength in the case.
 
-    A ratio is (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution with modulus m and mean 1),
-    times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th number of the generator.
+    A ratio is 1 or, with scatter, (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U (Weibull's distribution with
+    modulus m, mean 1), times the column `strength` in a fibre table.  In any cell, fibre N takes the N-th random
+    number.
     """
     factors = np.ones(fibres)
     scatter = case.interface.scatter if case.interface else None

@@ -35,11 +35,9 @@ class RecoveredFields:
 
     Attributes:
         displacement: for each problem, u* (dofs, s) of this rank's parts; 0 in states without a response.
-        stress: (s, 6, e) element means in the order of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux replaces
-            the stresses 13, 23 and 33.
+        stress: (s, 6, e) element means of `voigt.SPATIAL_STRESSES`; in conduction, minus the flux at 13, 23 and 33.
         largest: largest stresses in each phase, for each state.  The principal stress is the largest one, signed; the
-            hydrostatic stress is a third of the trace.  Phases whose constants do not determine S33, and phases in
-            conduction, have no entry.
+            hydrostatic stress is a third of the trace.  Phases without a determined S33, or in conduction, are absent.
     """
 
     displacement: list[Float]
@@ -51,8 +49,8 @@ class RecoveredFields:
 class NodalFields:
     """The nodal fields of a state in the plane or the axial problem, with c displacements per node.
 
-    Attributes: `displacement` H y + u* (n, c), Eq. (14), at the positions y of the parts' plane nodes, with the
-    macroscopic gradient H; `traction` and `jump` (k, c) at the interface nodes.
+    `displacement` (n, c) is H y + u*, Eq. (14), at the positions y of the parts' plane nodes, with the macroscopic
+    gradient H; `traction` and `jump` (k, c) are at the interface nodes.
     """
 
     displacement: Float
@@ -61,7 +59,7 @@ class NodalFields:
 
 
 def with_displacements(cell: TornCell, responses: Sequence[Response]) -> list[Response]:
-    """Return the responses with u* inside the subdomains.  Collective."""
+    """Return the responses with u* inside the subdomains, in copies unless all have it.  Collective."""
     if all(len(response.inside) == cell.offsets[-1] for response in responses):
         return list(responses)
     u = np.stack([response.u for response in responses], axis=1)
@@ -100,7 +98,7 @@ def recover(cell: TornCell, states: Sequence[Sequence[Response | None]]) -> Reco
 
 
 def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: Problem) -> NodalFields:
-    """Compute the nodal fields of a response with the recovered u* (dofs,); zero without a response.  Collective."""
+    """Compute the nodal fields of a response from the recovered u* (dofs,); zero without a response.  Collective."""
     nodes, c = cell.jumps.nodes, problem.components
     if response is None:
         n, k = sum(len(part.mesh.points) for part in cell.parts), len(nodes.row)
@@ -178,7 +176,7 @@ def _measures(material: material_forms.Material, stress: Float) -> Float:
 
 
 def _largest(values: Float, points: Float) -> Largest:
-    """Find the largest of the values (n, v) and their points (n, v or 1, 2); ties take the first by x, then y."""
+    """Find the largest value of each column of (n, v), and its point in (n, v or 1, 2); ties: least x, then least y."""
     peak, positions = values.max(axis=0), np.zeros((values.shape[1], 2))
     for number, (column, top) in enumerate(zip(values.T, peak, strict=True)):
         tied = points[column >= top - TIE * abs(top), number % points.shape[1]]

@@ -19,7 +19,7 @@ POINTS, WEIGHTS = roots_legendre(6)
 
 
 class SpringSides:
-    """The element sides along springs on this rank, and the interface nodes of all ranks."""
+    """The element sides along springs on this rank, and interface nodes of all ranks, for errors of spring energy."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class SpringSides:
         self._share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[lattice.order]
 
     def errors(self, status: Status, compliance: Float, lam: Float) -> tuple[Float, Float]:
-        """Return the spring energy errors (k, k) beyond tips, and along sides in addition to `arc_energy`.  Collective.
+        """Return two errors (k, k) of spring energy: beyond tips; along sides, to add to `arc_energy`.  Collective.
 
         Args:
             status: (n,) states at this rank's interface nodes.

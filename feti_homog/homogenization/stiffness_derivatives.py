@@ -49,7 +49,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Differentiate the stiffness with respect to all constants, by unit-load responses of each cell.  Collective."""
+    """Differentiate the stiffness by all constants, from responses to unit loads in each problem.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
     changes, is_heated = list[Derivative](), "temperature" in cells[0].solver.problem.loads
@@ -123,7 +123,7 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
 
 
 def _products(fields: shape_functions.ElementFields) -> Float:
-    """Return int f f^T (mk + 1, mk + 1) for f = [strains, 1], less r^2 / 2 in products of 11 and 22."""
+    """Integrate f f^T (mk + 1, mk + 1) of f = [strains, 1], less r^2 / 2 (`ElementFields`) in products of 11 and 22."""
     *points, _, k = fields.strain.shape
     gram = _gram(np.concatenate([fields.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), fields.weights)
     if fields.rest is not None:  # isotropic dA: -d lambda r^2 in the products of 11 and 22
@@ -134,7 +134,7 @@ def _products(fields: shape_functions.ElementFields) -> Float:
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """Return int f f^T (n, n) for fields f (e, q, n) with integration weights (e, q)."""
+    """Integrate the products f f^T (n, n) of fields f (e, q, n) with integration weights (e, q)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 
@@ -147,7 +147,7 @@ def _growing_fraction(case: Case) -> float | None:
 
 
 def _velocity(points: Float, cell: CellSummary) -> Float:
-    """Return V = dx / d ln R (n, 2) at points (n, 2) while all fibres grow.
+    """Return the velocity V = dx / d ln R (n, 2) of points (n, 2) while the radii R of all fibres grow.
 
     In a fibre with centre c, V is x - c; outside, V falls to 0 halfway to the next fibre.
     """

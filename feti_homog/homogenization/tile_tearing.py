@@ -40,8 +40,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: Intracomm, policy: Partitio
 def place_nodes(case: Case, comm: Intracomm, policy: tiling.TilePolicy) -> gmsh_mesher.NodedCell | CoarseMesh | None:
     """Place nodes on the lines of the cell.  Collective.
 
-    Return the cell with these nodes, or a user's mesh, on rank 0; None on other ranks.  Raises CaseError and MeshError
-    on every rank, as in `begin_mesh`.
+    Return the cell with nodes, or a user's mesh, on rank 0; None on others.  Raises like `begin_mesh` on every rank.
     """
     cell = mpi_errors.on_root_only(comm, begin_mesh, case, policy)
     unmeshed = cell if isinstance(cell, gmsh_mesher.UnmeshedCell) else None
@@ -81,7 +80,7 @@ def begin_mesh(case: Case, policy: tiling.TilePolicy) -> gmsh_mesher.UnmeshedCel
 
 
 def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: Intracomm) -> CoarseMesh | None:
-    """Fill the tiles on all ranks, and join the mesh on rank 0; None on others.  Collective.
+    """Fill the tiles on all ranks, and return the joined mesh on rank 0, None on other ranks.  Collective.
 
     Raises MeshError on every rank if a rank cannot fill a tile.
     """
@@ -98,9 +97,9 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: Intracomm)
 def filled_tiles(
     tiles: Sequence[tile_filling.Tile], comm: Intracomm
 ) -> list[tuple[int, tile_filling.Tile, tile_filling.Filling]]:
-    """Deal the `tiles` of rank 0 to all ranks, and fill them; return this rank's with their numbers.  Collective.
+    """Deal the `tiles` of rank 0 to all ranks, and fill them.  Collective.
 
-    Raises MeshError on every rank if gmsh cannot fill a tile.
+    Return (number, tile, filling) of this rank's tiles.  Raises MeshError on every rank if gmsh cannot fill a tile.
     """
     parts: list[list[tuple[int, tile_filling.Tile]]] = [[] for _ in range(comm.size)]
     loads = np.array([len(tile.points) for tile in tiles], np.int64)
@@ -115,8 +114,8 @@ def can_be_torn_by_tiles(
 ) -> bool:
     """Return whether the ranks can cut the cell without the whole mesh.
 
-    Arc tips, bodies cut by the sides, a given subdomain count, which may be below the tile count, and cells probably
-    small enough for cuts across materials need the whole mesh on one rank, like a user's mesh or a single tile.
+    The whole mesh on one rank is needed for arc tips, bodies cut by the sides, a given subdomain count (it may be below
+    the tile count), cells probably small enough for cuts across materials, user's meshes and single tiles.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
@@ -128,7 +127,7 @@ def can_be_torn_by_tiles(
 def tear_by_tiles(
     case: Case, noded: gmsh_mesher.NodedCell | None, lattice: ReferenceLattice, comm: Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """Tear a cell by its tiles, and return this rank's part.  Collective.
+    """Tear a tiled cell, each rank its own tiles, and return this rank's part.  Collective.
 
     Raises CaseError and MeshError on every rank, as in `tiled_cell` and `tile_filling.fill`.
     """
@@ -198,7 +197,7 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
-    """Assign a rank to each subdomain (s,) with `load` (s,), by the `neighbours` of all ranks."""
+    """Return a rank for each subdomain (s,), from the `load` (s,) and the result of `_neighbours` on all ranks."""
     a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)

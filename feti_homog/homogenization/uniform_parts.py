@@ -52,7 +52,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield each subdomain's parts, ordered by phase and body; `phase_of` (constituents,) names phases."""
+    """Yield the one-body parts of each subdomain, by phase and body; `phase_of` (constituents,) names phases."""
     for number, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(number, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -103,7 +103,7 @@ def share_parts(
 
 
 class ForcesBetweenParts:
-    """The operator from displacements to multipliers that keep parts in equilibrium; B is the parts' jump operator."""
+    """The operator from displacements to multipliers that keep parts in equilibrium; B is their jump operator."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
         """Assemble stiffness K and load forces Q of the coarse triangles at shared nodes.  Collective."""
@@ -124,7 +124,7 @@ class ForcesBetweenParts:
         self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
-        """Return lam = (B B^T)^-1 B (-K u - Q E) (owned rows,) for u (dofs,) and `loads` E.  Collective."""
+        """Return multipliers (B B^T)^-1 B (-K u - Q E) (owned rows,) under u (dofs,) and `loads` E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
@@ -132,7 +132,7 @@ class ForcesBetweenParts:
 
 @dataclass(frozen=True)
 class NestedInterior:
-    """The factor of the interior on a coarser mesh, for a group of subdomains with one phase.
+    """The factored stiffness of interiors on a coarser mesh, for a group of subdomains with one phase.
 
     Attributes:
         members: subdomains.
@@ -151,7 +151,7 @@ class NestedInterior:
     loads: Float | None
 
     def displacement(self, u: Float, loads: Float) -> Float:
-        """Extend u (boundary dofs, k) under the loads (v, k) to u* (classes, c, k) at all nodes."""
+        """Extend u (boundary dofs, k) under the loads (v, k) to u* (classes, c, k) at all nodes of the coarser mesh."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # NONE takes the last row
         all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
@@ -171,7 +171,7 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 def nested_interiors(
     boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
 ) -> Iterator[NestedInterior]:
-    """Yield this rank's subdomain interiors, refined, assembled and factored on a coarser lattice, by group."""
+    """Yield the `NestedInterior` of each group of this rank's subdomains, on the lattice `coarser`."""
     nested, inside = coarser.within(lattice), NONE - 1
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
@@ -196,7 +196,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Group consecutive subdomains by phase: at most ELEMENTS_AT_ONCE elements or one subdomain.  Yields indices."""
+    """Yield the indices of consecutive subdomains of one phase, up to ELEMENTS_AT_ONCE elements or one subdomain."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks, torn into subdomains.
+    """The cell on all ranks, torn into subdomains, with the dual solver of one problem.
 
-    `lattice` refines the `subdomains` of each rank.  `axial` is the cell with displacements along the fibres, on the
-    same meshes and interface nodes; None unless the plane state is generalized plane strain.
+    `summary` and `table` describe the whole cell and all subdomains; `lattice` refines the `subdomains` of each rank.
+    In generalized plane strain, `axial` is the cell with displacements along the fibres, on the same meshes and nodes.
     """
 
     comm: MPI.Intracomm
@@ -55,12 +55,12 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """The first degree of freedom of each part in this rank's vectors, and their length: (parts + 1,)."""
+        """The first degree of freedom of each part in this rank's vectors, then the vectors' length: (parts + 1,)."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """The one-body parts of this rank's subdomains, numbered over all ranks.  Collective when first read."""
+        """The one-body parts, numbered over all ranks, of this rank's subdomains.  Collective when first read."""
         phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
         parts = list(uniform_parts.parts_of(self.subdomains, phases))
         if not self.summary.across:
@@ -79,7 +79,7 @@ class TornCell:
 
     @cached_property
     def _forces(self) -> uniform_parts.ForcesBetweenParts:
-        """The operator that finds the multipliers between parts.  Collective when first read."""
+        """The operator that gives multipliers between parts from displacements.  Collective when first read."""
         return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def extended(self, u: Float, loads: Float) -> Float:
@@ -98,9 +98,9 @@ class TornCell:
         return zip(self.parts, np.split(u, self.offsets[1:-1]), strict=False)
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """Return the multipliers and openings between parts.  Collective.
+        """Return the multipliers and openings (owned rows of `jumps`,) between all parts.  Collective.
 
-        Both are (owned rows of `jumps`,); `u` has the displacements of all parts on this rank.
+        If subdomains reach across materials, both follow from the displacements `u` (dofs,) of this rank's parts.
         """
         if not self.summary.across or not self.jumps.global_rows:  # without jumps the cell is a single part
             return solution.lam, solution.opening
@@ -115,7 +115,7 @@ class TornCell:
 
     @cached_property
     def spring_sides(self) -> SpringSides:
-        """The element sides along springs.  Collective when first read."""
+        """The element sides along springs, for errors of spring energy.  Collective when first read."""
         from feti_homog.homogenization.spring_errors import SpringSides
 
         jumps = self.solver.jump_operator
@@ -161,7 +161,7 @@ class TornCell:
         return self.lattice.coarser(2 if often and not self.summary.across else 1)
 
     def debonded(self, opening: float | None) -> Bool:
-        """Return the mask (k,) of this rank's initially debonded nodes; arcs without angle take `opening` degrees."""
+        """Return the mask (k,) of this rank's initially debonded nodes; arcs without angle have `opening` degrees."""
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
         is_debonded = nodes.precracked & bool(self.case.interfaces)
@@ -182,7 +182,7 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Return the area fraction of each phase, in the cell including voids.  Collective."""
+        """Return the area fraction of each phase; the area of voids counts as cell area.  Collective."""
         areas = self.areas()
         total = self.summary.area if self.summary.voids else sum(areas.values())
         return {phase: area / total for phase, area in areas.items()}
@@ -274,7 +274,7 @@ def assemble_subdomains(
 
 
 def _laws(case: Case, summary: CellSummary, submesh: Submesh, problem: Problem) -> Float:
-    """Return the phase stiffnesses of a subdomain: (v, v), or (phases, v, v) across materials."""
+    """Return the stiffnesses of a subdomain's phases: (v, v) in one material, or (phases, v, v) across materials."""
     laws = np.stack([phase_laws.law(case, phase, problem) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
 

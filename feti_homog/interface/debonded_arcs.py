@@ -26,7 +26,7 @@ NOT_MOVED: MovedTips = {}
 
 
 class InterfaceChains:
-    """The chains of interface nodes, by the neighbours along the interface.
+    """Chains of interface nodes, stored as the neighbours of each node along its interface.
 
     Attributes:
         neighbours: (n, 2) neighbours of each node, both -1 unless the node has exactly two.
@@ -62,7 +62,7 @@ class InterfaceChains:
 
 @dataclass(frozen=True)
 class CrackTips:
-    """The t tips of debonded arcs, as numbers of interface nodes.
+    """The t tips of debonded arcs, each with its two neighbours, as numbers of interface nodes.
 
     Attributes:
         node: (t,) tips, which are bonded.
@@ -79,7 +79,7 @@ class CrackTips:
 
 
 def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """Return the energy release rates (c,) of c components, opening and shear or axial shear, at least 0.
+    """Return the energy release rates (c,) of opening and shear, or of axial shear alone; at least 0.
 
     Irwin's integral for closing the end of a crack, over the closed length a, is the work per length
 
@@ -98,9 +98,9 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 
 
 def tips(arcs: Sequence[interface_section.Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
-    """Return the sorted tip directions in [0, 360) of each fibre with tips, by fibre number from 0.
+    """Return the sorted tip directions in [0, 360) of each fibre with tips, by fibre number from 0 to `fibres` - 1.
 
-    An arc without an angle takes every opening in `values`.  Openings of 0 and 360 degrees have no tips.
+    An arc without an angle takes every opening in `values`, in degrees.  Openings of 0 and 360 have no tips.
     """
     marks: dict[int, set[float]] = {}
     for arc in arcs:
@@ -141,7 +141,7 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[interface_section.Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Return the mask (k,) of nodes within debonded arcs.
+    """Return the mask (k,) of nodes strictly within debonded arcs; tips stay bonded.
 
     Nodes lie on fibres (k,), numbered from 1, in directions `angle` (k,); `moved` are the tips that the mesh has moved.
     Arcs without an angle take `opening`, which must then be given.
@@ -171,7 +171,7 @@ def _end(arc: interface_section.Arc, half: float) -> float:
 
 
 def faults(arcs: Sequence[interface_section.Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults in debonded arcs of the interface `label`, for fibre `centres` (n, 2), NaN without a centre."""
+    """List faults in the debonded arcs of interface `label`; fibre `centres` (n, 2) are NaN without a centre."""
     messages = []
     for number, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -1,7 +1,7 @@
 """Prescribe loads by strains or conjugate stresses, compute scales of load effects, and solve under a load.
 
-Scales for errors are sizes of load effects in the bonded cell, independent of debonding.  For mixed loads, solutions
-under the prescribed strains and under unit strains, with equal active rows, are superposed to meet the stresses.
+Errors are relative to sizes of load effects in the bonded cell, which debonding does not change.  For mixed loads,
+solutions under prescribed strains and under unit strains, with equal active rows, are superposed to meet the stresses.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Macroscopic:
     """The macroscopic strains E, with temperature changes, and their work conjugates Sigma.
 
     E.Sigma is an energy per cell area.  With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two
-    states (Betti).
+    states E, Sigma and E', Sigma' (Betti).
 
     Attributes:
         strain, stress: (n,) E and Sigma.
@@ -86,14 +86,14 @@ class Load:
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
-        """Split the load into consecutive parts with `sizes` components."""
+        """Split the load into consecutive loads with the numbers of components in `sizes`."""
         ends = np.cumsum(sizes)[:-1]
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Return (1 - share) load + share end; components that cancel are zero.
+        """Return the load at the fraction `share` of the way to the load `end`; components that cancel are zero.
 
-        Both loads prescribe stresses in the same components.
+        Both loads must prescribe stresses in the same components.
         """
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
@@ -101,7 +101,7 @@ class Load:
 
 
 class LoadScales:
-    """The scales of the loads (v,) in a problem: m strains, then actions such as a temperature.
+    """Scales of the effects of v loads in a problem: m strains, then actions such as a temperature.
 
     Attributes:
         mean_stiffness: (v, v) mean stiffness <L>, Voigt's bound for strains.
@@ -111,7 +111,7 @@ class LoadScales:
             this fraction of `asked`.
         roots: (v,) square roots of the diagonal of `least_bonded_stiffness`, inf for loads without a stress; strains
             times these roots, and stresses over them, are comparable.
-        longest: (k,) largest tributary length on the interface of each node.
+        longest: (k,) for each node of this rank, the largest tributary length on the node's interface.
     """
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
@@ -148,7 +148,7 @@ class LoadScales:
         self.longest = self.over_interface(nodes.length)
 
     def over_interface(self, values: Float) -> Float:
-        """Return for each node the largest of `values` (k,) on its interface and all ranks, at least 0.  Collective."""
+        """Return, for each node, the largest of 0 and `values` (k,) on its interface over all ranks.  Collective."""
         inner, largest = self.solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -157,7 +157,7 @@ class LoadScales:
     def bond_stress(self, loads: Float) -> Float:
         """Return the scale of the stresses at this rank's bonds, (k,) or (k, n), under loads (v,) or (v, n).
 
-        This is the largest strain of `imposed_strain` times the stiffness of the softer body and the springs in series.
+        This is the largest `imposed_strain` times the stiffness of the softer body and the springs in series.
         """
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
@@ -174,15 +174,15 @@ class LoadScales:
 
     @property
     def sign_noise(self) -> float:
-        """The relative size of forces, gaps and stiffnesses up to which they may be the solver's error."""
+        """The relative size up to which forces, gaps and stiffnesses may be the solver's error."""
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def gap_noise(self, strain: Float) -> float:
-        """Return the largest gap under loads `strain` (v,) that may be the solver's error."""
+        """Return the size of gaps, under the loads `strain` (v,), up to which a gap may be the solver's error."""
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
-        """Return the largest nodal forces (k,) that may be the solver's error.  Collective.
+        """Return the sizes (k,) up to which nodal forces may be the solver's error.  Collective.
 
         The error is relative to the largest force on the interface or, if larger, to the force that the imposed strain
         causes: errors in jumps change forces by the stiffness of the softer side.  Forces on other interfaces and
@@ -195,7 +195,7 @@ class LoadScales:
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def asked(self, load: Load) -> Float:
-        """Return the sizes (v,) of the strains that a load prescribes or causes in the bonded cell."""
+        """Return the absolute strains (v,) that a load prescribes, or causes by stresses, in the bonded cell."""
         k = self.solver.problem.stresses
         strain = np.abs(np.where(load.by_stress, 0.0, load.values))
         stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
@@ -203,7 +203,7 @@ class LoadScales:
         return np.asarray(strain)
 
     def acting(self, strain: Float, asked: Float) -> Float:
-        """Return the load sizes |`strain`| (v,) of a state as scales for errors, with strains clipped.
+        """Return the sizes (v,) of a state's loads `strain` (v,), with strains clipped, as scales for errors.
 
         The lower limit of a strain, `bound_ratio` times its size in `asked` (v,), matters where a path with friction
         returns to zero stress.  The upper limit is ABSURD times the largest strain that `asked` imposes.
@@ -213,11 +213,11 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of the largest imposed strains of a state (v,) and of `asked` (v,); 0 if `asked` is 0."""
+        """Return the ratio of the largest imposed strains of `strain` (v,) and `asked` (v,); 0 if `asked` is zero."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
-        """Return strain sizes, (m,) or (m, n), of loads (v,) or (v, n): strains plus the largest free thermal strains.
+        """Return the sizes, (m,) or (m, n), of strains plus largest free thermal strains, under loads (v,) or (v, n).
 
         Entries after the first v, the stresses of tractions on the sides, follow from the first v and do not count.
         """
@@ -228,7 +228,7 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     """Solve the dual problem under a load, from multipliers `start` (owned rows,).  Collective.
 
     Strains that no stiffness resists stay zero if their stresses are below the solver's error.  Raises NotCarriedError
-    if no stiffness resists the stresses.
+    on every rank if the stresses are larger.
     """
     solver = scales.solver
     if not (load.by_stress.any() and load.values.any()):
@@ -261,10 +261,10 @@ def solve_load(scales: LoadScales, load: Load, start: Float) -> DualSolution:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """Mark strains (v,) under prescribed stresses that a motion without stiffness changes.  Collective.
+    """Mark the strains (v,) that prescribed stresses leave undetermined.  Collective.
 
     Under such a strain, rigid motions of the torn bodies close all active jumps, and the bodies bear no stress: only
-    debonded faces move apart.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is the cell area times <L>.
+    debonded faces move apart.  `by_stress` (v,) marks prescribed stresses; `voigt` (v, v) is area times mean stiffness.
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]

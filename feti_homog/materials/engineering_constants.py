@@ -64,7 +64,7 @@ class EngineeringConstants:
 
 @dataclass(frozen=True)
 class TransverseIsotropy:
-    """Constants of the nearest transversely isotropic material about x3; five of seven are independent."""
+    """Constants of the nearest material isotropic about x3; five of the seven elastic constants are independent."""
 
     E_axial: float = described("Young's modulus along the fibres", records.STRESS)
     E_transverse: float = described("Young's modulus across the fibres", records.STRESS)
@@ -94,9 +94,9 @@ def constants(C: Array, heat: Array | None = None) -> dict[str, Any]:
     """Tabulate the constants of a stiffness C, real or complex, by name.
 
     The table has Cij of the upper triangle without COUPLINGS, and E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk with
-    S = C^-1; in space also the constants of `about_fibres` and, from the stress `heat` (6,) under a unit temperature,
-    normal thermal stresses, free normal strains -S heat and their mean across the fibres.  Raises
-    numpy.linalg.LinAlgError if C is singular.
+    S = C^-1 and the position k of shear ij; in space also the constants of `about_fibres` and, if `heat` (6,) is the
+    stress under a unit temperature, its normal stresses, the free normal strains -S heat and their mean across the
+    fibres.  Raises numpy.linalg.LinAlgError if C is singular.
     """
     S, n = np.linalg.inv(C), len(C)
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
@@ -158,10 +158,10 @@ def engineering_moduli(stiffness: ArrayLike) -> Moduli:
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[Any, Any]:
-    """Return the moduli k and mu of the nearest isotropic stiffness, of a real or complex one.
+    """Return the bulk modulus k and shear modulus mu of the isotropic stiffness nearest to C (3, 3), real or complex.
 
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8 for a plane stiffness C (3, 3), nearest in the
-    Frobenius norm of tensors.  Turns of the axes change neither.
+    k = (C11 + C22 + C12 + C21)/4 and mu = (C11 + C22 - C12 - C21 + 4 C33)/8 are nearest in the Frobenius norm of
+    tensors.  Turns of the axes change neither.
     """
     c = np.asarray(stiffness)
     off = c[0, 1] + c[1, 0]
@@ -175,7 +175,7 @@ def isotropic_stiffness(bulk: float, shear: float) -> Float:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """Return the distance ||C - C_iso|| / ||C|| of C (3, 3), in any axes, from the nearest isotropic stiffness."""
+    """Return the relative distance ||C - C_iso|| / ||C|| of C (3, 3) to the nearest isotropic stiffness C_iso."""
     c = np.asarray(stiffness, dtype=float)
     return _distance(c, isotropic_stiffness(*isotropic_part(c)))
 
@@ -193,9 +193,9 @@ def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
 
 
 def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverseIsotropy:
-    """Return the nearest transversely isotropic constants, with `deviation` = ||C - C_nearest|| / ||C||.
+    """Return the constants of the transversely isotropic material nearest to a stiffness C (6, 6), see `about_fibres`.
 
-    The mean over all turns, as in `about_fibres`, has expansions alpha_33 and (alpha_11 + alpha_22)/2, None if unknown.
+    `deviation` is ||C - C_nearest|| / ||C||.  `expansion` (6,) gives alpha_33 and (alpha_11 + alpha_22)/2, else None.
     """
     c = np.asarray(stiffness, dtype=float)
     table = {name: float(value) for name, value in about_fibres(c).items()}
@@ -245,7 +245,7 @@ CELL_AXES = "axes of the cell, x3 along the fibres"
 MATERIAL_AXES = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
 ALONG, ACROSS = "along", "across"
 MATERIAL_EXPANSIONS = ("expansion_axial", "expansion_x1", "expansion_x2", *EXPANSIONS[3:])
-"""Names of the expansions in material axes; `voigt.EXPANSIONS` has the names in cell axes."""
+"""Names of the expansions in the order of material axes; `voigt.EXPANSIONS` has the names in the order of cell axes."""
 
 
 class Constant(NamedTuple):
@@ -273,7 +273,7 @@ OF_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "
 """Names of constants in cell axes, by their names in material axes."""
 _PLACES = (("expansion.", EXPANSIONS), ("thermal_stress.", THERMAL_STRESSES), ("alpha", MATERIAL_EXPANSIONS))
 FORMER = {f"{former}{k + 1}": names[k] for former, names in _PLACES for k in range(3)}
-"""Removed names, each with its replacement."""
+"""Removed names of constants, each with the name that replaces it."""
 # Names with another meaning in a ply: kind and direction in a cell, and the names for the other direction.
 _READ_EITHER_WAY = {
     "E1": ("Young's modulus", ACROSS, "E_axial"), "E3": ("Young's modulus", ALONG, "E_transverse"),
@@ -289,7 +289,7 @@ _READ_EITHER_WAY = {
 
 
 def axes_line(names: Iterable[str]) -> str:
-    """Describe the axes of names with another meaning in a ply, such as `S12`; '' without such names."""
+    """Explain the directions of names with another meaning in a ply, such as `S12`; '' without such names."""
     lines = []
     for name in dict.fromkeys(name.rpartition("_")[2] for name in names):
         if name in _READ_EITHER_WAY:

@@ -21,11 +21,11 @@ MODULI_ACROSS = ("E_transverse", "G_transverse", "G_axial")
 
 
 def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
-    """Estimate the constants of fibres in a matrix by each method.
+    """Estimate the constants of fibres in a matrix by each method, None where a method gives no value.
 
-    The rule of mixtures and Mori and Tanaka's estimate allow several kinds of fibres, the other methods one; only the
-    last three methods allow springs.  No method gives a constant if a phase is not transversely isotropic about x3, nor
-    an expansion if a phase has no expansion.
+    The rule of mixtures and Mori and Tanaka's estimate allow several kinds of fibres, the other methods one; springs
+    are allowed by `mori_tanaka`, `composite_cylinders` and `self_consistent` alone.  No method gives a constant if a
+    phase is not transversely isotropic about x3, nor an expansion if a phase has no expansion.
     """
     able = set(METHODS)
     if any(family.springs is not None for family in fibres):
@@ -108,7 +108,7 @@ def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[
 
 
 def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
-    """Return E_A, nu_A, alpha_A and alpha_T by the rule of mixtures; expansions None unless all phases have both."""
+    """Return E_A, nu_A and expansions by name, by the rule of mixtures; expansions None unless all phases have both."""
     phases = _phases(matrix, fibres)
     E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
     axial = transverse = 0.0

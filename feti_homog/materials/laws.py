@@ -21,7 +21,7 @@ NEEDED: dict[type[Any], tuple[tuple[str, ...], tuple[str, ...], str]] = {
     material_forms.Orthotropic: (("E3", "nu13", "nu23"), ("G13", "G23"), f"; {OF_DATA_SHEETS}"),
     material_forms.TransverselyIsotropic: (("E_axial", "nu_axial"), ("G_axial",), ""),
 }
-"""Optional constants that plane strain needs, further ones of generalized plane strain, and a hint, by form."""
+"""By form: constants that plane strain needs, constants that generalized plane strain needs too, and a hint."""
 # Relative deviation, due to rounding, up to which a material counts as isotropic or transversely isotropic.
 ISOTROPY = 1e-9
 # Relative asymmetry up to which a matrix counts as symmetric, because its digits are rounded.
@@ -42,7 +42,7 @@ def stiffness_of(material: material_forms.Material, plane: str) -> Float:
 
 
 def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
-    """Return C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite, in stress units.
+    """Return the stiffness C (3, 3): [S11, S22, S12] = C [E11, E22, gamma12], symmetric positive definite.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is the block at E33 = 0.  Raises
     ValueError if the constants do not determine C, contradict each other or belong to no stable material.
@@ -67,7 +67,7 @@ def plane_stiffness(material: material_forms.Material, plane: str) -> Float:
 
 
 def conductivity(material: material_forms.Material) -> Float:
-    """Return k (3, 3) in cell axes, q = -k grad T.  ValueError unless k is given, symmetric and positive definite."""
+    """Return the conductivity k (3, 3) in cell axes; ValueError unless it is given, symmetric, positive definite."""
     k = material.conductivity
     if k is None:
         raise ValueError('conductivity: missing; [analysis] type = "conductivity" needs it')
@@ -82,7 +82,7 @@ def conductivity(material: material_forms.Material) -> Float:
 def isotropic_ratio(material: material_forms.Material) -> float | None:
     """Return Poisson's ratio of an isotropic material; None for other materials, and for a given stiffness.
 
-    Transversely isotropic constants count as isotropic up to ISOTROPY.  Raises ValueError as `transverse_ratio` does.
+    Transversely isotropic constants that agree up to ISOTROPY count as isotropic.  Raises as `transverse_ratio` does.
     """
     if isinstance(material, material_forms.TransverselyIsotropic):
         young, ratio = material.E_transverse, transverse_ratio(material)
@@ -95,7 +95,7 @@ def isotropic_ratio(material: material_forms.Material) -> float | None:
 
 
 def spatial_stiffness(material: material_forms.Material) -> Float:
-    """Return C (6, 6): S = C E in the cell's axes, symmetric positive definite, in stress units.
+    """Return the stiffness C (6, 6), from strains to stresses in the cell's axes, symmetric positive definite.
 
     Raises ValueError as `plane_stiffness` does, and for a given stiffness (3, 3).
     """
@@ -137,9 +137,9 @@ def expansion(material: material_forms.Material) -> Float | None:
 
 
 def out_of_plane(material: material_forms.Material, plane: str) -> tuple[Float, Float]:
-    """Return the rows s and e (3,): S33 = s . [S11, S22, S12], E33 = e . [S11, S22, S12], in plane strain and stress.
+    """Return rows s and e (3,) for plane stresses S = [S11, S22, S12]: S33 = s . S in plane strain, else E33 = e . S.
 
-    s is zero in plane stress, e in plane strain; undetermined rows are NaN.  Raises ValueError for invalid constants.
+    The other row is zero; undetermined rows are NaN.  ValueError for conductors and for contradictory constants.
     """
     # E33 = row . [S11, S22, S12] + S33 / young
     material = _elastic(material)
@@ -166,7 +166,7 @@ def _elastic(material: material_forms.Material) -> material_forms.Elastic:
 
 
 def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]:
-    """Return Lame's constant, reduced in plane stress, and the shear modulus; ValueError if the first is infinite."""
+    """Return Lame's constant, reduced in plane stress, and the shear modulus; ValueError if the former is infinite."""
     state = voigt.PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
@@ -181,7 +181,7 @@ def _angle(material: material_forms.Material) -> float:
 
 
 def _checked_stiffness(material: material_forms.General) -> Float:
-    """Return the given stiffness, (3, 3) or (6, 6), without rounding errors.  Raises ValueError for an invalid one."""
+    """Return the given stiffness, (3, 3) or (6, 6), exactly symmetric, with zero COUPLINGS; ValueError if invalid."""
     stiffness = _symmetric("stiffness", material.stiffness)
     noise = NOISE * np.abs(stiffness).max()
     if len(stiffness) == 6:
@@ -195,7 +195,7 @@ def _checked_stiffness(material: material_forms.General) -> Float:
 
 
 def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
-    """Return the symmetric part of a matrix.  Raises ValueError for a relative asymmetry above NOISE."""
+    """Return the symmetric part of a matrix (n, n).  Raises ValueError for a relative asymmetry above NOISE."""
     matrix = np.array(rows)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=NOISE * np.abs(matrix).max()):
         raise ValueError(f"{name} = {wording.toml_value(rows)}: expected a symmetric matrix")
@@ -203,14 +203,14 @@ def _symmetric(name: str, rows: material_forms.Matrix) -> Float:
 
 
 def _positive_definite(name: str, matrix: Float) -> Float:
-    """Return the matrix unchanged.  Raises ValueError unless it is positive definite."""
+    """Return the symmetric matrix (n, n) unchanged.  Raises ValueError unless it is positive definite."""
     if not voigt.is_positive_definite(matrix):
         raise ValueError(f"{name} = {wording.toml_value(matrix.tolist())}: expected a positive definite matrix")
     return matrix
 
 
 def stable_compliance(material: material_forms.Orthotropic | material_forms.TransverselyIsotropic, plane: str) -> Float:
-    """Return the compliance (6, 6) as `known_compliance`; ValueError if unstable."""
+    """Return `known_compliance` (6, 6); ValueError if no stable material has these constants in the plane state."""
     compliance, state = known_compliance(material), voigt.PLANE_STATES[plane]
     if not voigt.is_positive_definite(compliance[:2, :2]):
         if isinstance(material, material_forms.Orthotropic):
@@ -233,7 +233,7 @@ def stable_compliance(material: material_forms.Orthotropic | material_forms.Tran
 
 
 def missing_constants(form: type[Any], names: Collection[str], plane: str) -> list[str]:
-    """List the optional constants that a mechanical plane state needs and `names` lack, one line a fault."""
+    """List faults, one a line: constants that a form needs in a mechanical plane state, and `names` does not have."""
     state, faults = voigt.PLANE_STATES[plane], []
     if form is material_forms.TransverselyIsotropic and not {"nu_transverse", "G_transverse"} & {*names}:
         faults.append("nu_transverse, G_transverse: missing; expected one")
@@ -262,7 +262,7 @@ def known_compliance(material: material_forms.Orthotropic | material_forms.Trans
 
 
 def transverse_ratio(material: material_forms.TransverselyIsotropic) -> float:
-    """Return nu_transverse, else E_transverse/(2 G_transverse) - 1; ValueError unless exactly one of both is set."""
+    """Return Poisson's ratio across the fibres; ValueError unless one of nu_transverse, G_transverse alone is given."""
     ratio, shear = material.nu_transverse, material.G_transverse
     if ratio is not None and shear is None:
         return ratio

@@ -34,8 +34,8 @@ class LawChange:
     Attributes:
         name: key of the constant, with an index in an array, such as `stiffness.C12` or `expansion.3`.
         value: value of the constant.
-        stiffness: dC, (3, 3) or (6, 6); in conduction dk, (3, 3).
-        expansion: (6,) d alpha.
+        stiffness: derivative of the stiffness, (3, 3) or (6, 6); in conduction of the conductivity (3, 3).
+        expansion: (6,) derivative of the free strains per unit of temperature.
     """
 
     name: str
@@ -45,7 +45,7 @@ class LawChange:
 
 
 def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawChange]:
-    """Yield a `LawChange` for each constant and, in space, expansion.  Raises as `stiffness_of` and `expansion`."""
+    """Yield a `LawChange` for each constant; expansions only in space.  Raises as `stiffness_of` and `expansion` do."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     if PLANE_STATES[plane].is_scalar:
         yield from (LawChange(name, value, change, none) for name, value, change in _of_conduction(material))
@@ -72,7 +72,7 @@ def law_changes(material: material_forms.Material, plane: str) -> Iterator[LawCh
 
 
 def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC = -C dS C for each engineering constant.  S is the plane state's compliance."""
+    """Yield name, value and dC = -C dS C (n, n) for each engineering constant.  S is the plane state's compliance."""
     skipped = ("angle", "expansion", "strength", "conductivity", *material_forms.EXPANSION_PAIR)
     names = [field.name for field in fields(material) if field.name not in skipped]
     values = {name: value for name in names if (value := getattr(material, name)) is not None}
@@ -90,7 +90,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
-    """Yield name, value and dC for entries of a given stiffness except COUPLINGS; entries ij and ji change together."""
+    """Yield name, value and dC (n, n) for entries ij = ji of a given stiffness except COUPLINGS."""
     matrix = np.array(material.stiffness)
     for i, j in zip(*np.triu_indices(len(matrix)), strict=True):
         if (i, j) in COUPLINGS and len(matrix) == 6:
@@ -122,9 +122,9 @@ def _of_conduction(material: material_forms.Material) -> Iterator[tuple[str, flo
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Return the derivative of M, a stiffness or compliance with an imaginary step, in a plane state.
+    """Return the derivative (n, n) of M, a stiffness or compliance with an imaginary step, in a plane state.
 
-    A spatial state takes the whole matrix, a plane state its block; the state `condensed` eliminates component 33.
+    A spatial state takes all of M, a plane state a block; component 33 is eliminated if the state is `condensed`.
     """
     if PLANE_STATES[plane].is_spatial:
         return np.asarray(M.imag / STEP)
@@ -135,7 +135,7 @@ def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Differentiate `constants` of C and heat `thermal` along dC, dthermal; without thermal arguments, only of C."""
+    """Differentiate the table `constants` along dC and dthermal; without both thermal arguments, along dC alone."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal

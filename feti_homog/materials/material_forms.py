@@ -189,7 +189,7 @@ MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compres
 
 
 def criterion(strength: PhaseStrength) -> str:
-    """Return the name of the criterion that the keys select.  Raises ValueError unless one criterion has these keys."""
+    """Return the name of the criterion that the keys select; ValueError unless they are all keys of one criterion."""
     names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
         if names_given == list(names):
@@ -201,7 +201,7 @@ def criterion(strength: PhaseStrength) -> str:
 
 
 def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mises: Float) -> Float:
-    """Compute the utilisations (n, modes), at least 0, of a valid strength; Hashin has four modes, others one.
+    """Compute utilisations (n, modes), at least 0, of a valid strength: four modes by Hashin, one by other criteria.
 
     Args:
         stress: (n, 6) in the order [11, 22, 33, 23, 13, 12], x3 along the fibres.
@@ -225,7 +225,7 @@ def utilisation(strength: PhaseStrength, stress: Float, principal: Float, von_mi
 def _hashin(limits: Mapping[str, float], stress: Float) -> list[Float]:
     """Compute utilisations (n,) of the `MODES` from strengths `limits`; at most 0 for stresses of the opposite sign.
 
-    A mode a f^2 + b f = 1 with the load factor f at failure has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
+    A mode fails at a load factor f with a f^2 + b f = 1, and so has the utilisation 1 / f = (b + sqrt(b^2 + 4 a)) / 2.
     """
     S11, S22, S33, S23, S13, S12 = stress.T
     axial, across = np.hypot(S13, S23) / limits["axial_shear"], S11 + S22

@@ -75,7 +75,7 @@ class Springs:
 
 @dataclass(frozen=True)
 class Fibres:
-    """Round fibres with one phase and one radius; bonding is perfect without `springs`."""
+    """Round fibres with one phase, one radius and an area fraction; bonding is perfect without `springs`."""
 
     fraction: float
     constants: TransverseIsotropy
@@ -84,7 +84,7 @@ class Fibres:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The constants by one method; null where the method gives no value."""
+    """The constants by one method; None, which is null in results, where the method gives no value."""
 
     E_axial: float | None = described("Young's modulus along the fibres", records.STRESS)
     E_transverse: float | None = described("Young's modulus across the fibres", records.STRESS)
@@ -108,7 +108,7 @@ NOTHING = Estimate(**dict.fromkeys(CONSTANTS))
 
 @dataclass(frozen=True)
 class Estimates:
-    """Constants by each method."""
+    """The constants of a composite, estimated by each method."""
 
     rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
     chamis: Estimate = described("Chamis 1984")
@@ -135,7 +135,7 @@ class ConductivityEstimates:
 
 
 def dispersed(fractions: ArrayLike, values: ArrayLike, reference: float) -> float:
-    """Return 1 / sum c/(p + p0) - p0: the modulus of cylinders with fractions c and moduli p in a medium with p0."""
+    """Return the modulus 1 / sum c/(p + p0) - p0 of cylinders with fractions c and moduli p in a medium with p0."""
     return float(1 / np.sum(np.asarray(fractions, float) / (np.asarray(values, float) + reference)) - reference)
 
 
@@ -179,7 +179,7 @@ def aligned_cylinders(
 ) -> TransverseIsotropy:
     """Estimate the constants of cylinders in a reference medium under equal far fields.
 
-    With fractions c, moduli `surroundings` = (k0, m0, p0), x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
+    With fractions c, `surroundings` (k0, m0, p0), x_i = k_i + m0, h0 = k0 m0/(k0 + 2 m0), and * for the composite,
 
         1/(k* + m0) = sum c/x,  1/(m* + h0) = sum c/(m + h0),  1/(p* + p0) = sum c/(p + p0),
         l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
@@ -263,8 +263,8 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
     """Bound the constants of bonded, transversely isotropic cylinders along x3, with any section.
 
-    The bounds are `aligned_cylinders` in a medium with the least, or the greatest, moduli of the phases.  Hill's
-    relation at the bounds on k gives the bounds on nu_A, for two phases only; None for more.  All bounds except the
+    The bounds are `aligned_cylinders` in a medium with the least, or the greatest, moduli of the phases.  Bounds on
+    nu_A follow from the bounds on k by Hill's relation for two phases, and are None for more.  All bounds except the
     bounds on G_T also hold for square symmetry.  Hill 1964, Hashin 1965, Walpole 1969.
     """
 

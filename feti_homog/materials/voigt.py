@@ -1,4 +1,4 @@
-"""Define Voigt orders with engineering shears: component names, plane states, rotations, stress measures.
+"""Define Voigt notation with engineering shears: component names, plane states, rotations and stress measures.
 
 The order is [11, 22, 12] in plane strain and stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
@@ -25,7 +25,7 @@ IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
 
 @dataclass(frozen=True)
 class PlaneState:
-    """A plane state of the analysis.
+    """A plane state of the analysis: the names, order and number of strain and stress components.
 
     Attributes:
         name: value of [analysis] plane.
@@ -36,7 +36,7 @@ class PlaneState:
             is a separate problem, and stiffness (6, 6), constants, estimates and bounds are spatial.
         is_scalar: whether the unknown is a temperature: its gradient takes the positions [13, 23, 33] of strains, and
             -q the positions of stresses, with the heat flux q; the stiffness is the conductivity (3, 3).
-        numbers: numbers in the names Cij of stiffness entries for the three plane strains.
+        numbers: digits i, j in the names Cij of stiffness entries, for the three in-plane components.
     """
 
     name: str
@@ -60,7 +60,7 @@ class PlaneState:
 
     @property
     def normals(self) -> int:
-        """The number of normal strains among the components; they come first."""
+        """The number of normal strains, which come first among the components."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 
@@ -79,7 +79,7 @@ def plane_state_of(document: Document) -> PlaneState:
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of `count` strains and stresses: 3 in the plane, otherwise 6 in space."""
+    """Return strain and stress names: the three in the plane if `count` is 3, otherwise the six in space."""
     return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
@@ -90,9 +90,9 @@ def turned_axes(angle: float) -> Float:
 
 
 def rotated(stiffness: Float, angle: float) -> Float:
-    """Turn a stiffness, (3, 3) or (6, 6), to the cell's axes from material axes turned by `angle` degrees.
+    """Transform a stiffness C', (3, 3) or (6, 6), to cell axes from material axes turned about x3 by `angle` degrees.
 
-    C = T^T C' T, where T takes strains to the material axes.
+    The result is C = T^T C' T with the matrix T of `strain_rotation`.
     """
     rotation = strain_rotation(angle)
     to_axes = rotation if len(stiffness) == 6 else rotation[IN_PLANE_BLOCK]
@@ -108,7 +108,7 @@ def strain_rotation(angle: float) -> Float:
 
 
 def is_positive_definite(matrix: Float) -> bool:
-    """Return whether a symmetric matrix, scaled to a diagonal of 1, has only eigenvalues above 1e-12."""
+    """Return whether a symmetric matrix is positive definite: scaled to a diagonal of 1, eigenvalues exceed 1e-12."""
     diagonal = np.diag(matrix)
     if diagonal.min() <= 0.0:
         return False
@@ -124,7 +124,7 @@ def von_mises(stress: Float, S33: Float) -> Float:
 
 
 def principal(stress: Float, S33: Float) -> Float:
-    """Return the principal stresses (m, 3) of [S11, S22, S12] and S33 (m,), largest first; NaN where S33 is NaN."""
+    """Return principal stresses (m, 3) of [S11, S22, S12] (m, 3) and S33 (m,), largest first; NaN where S33 is NaN."""
     S11, S22, S12 = stress.T
     middle, radius = (S11 + S22) / 2, np.hypot((S11 - S22) / 2, S12)
     ordered = np.sort(np.stack([middle - radius, middle + radius, S33], axis=1), axis=1)[:, ::-1]

@@ -65,7 +65,7 @@ class ContactProblem:
     def active(self, status: Status) -> Float:
         """Mark the active multipliers (owned rows,) by 1, all others by 0.
 
-        All are active except at debonded nodes; there, with `contact`, only the normal multipliers of closed nodes are.
+        Multipliers of debonded nodes are inactive, except the normal multipliers of closed nodes with `contact`.
         """
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
@@ -78,7 +78,7 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """Return the spring compliance C (owned rows,) in a bond state; without damage, `intact_compliance` itself."""
+        """Return the spring compliance C (owned rows,) in a bond state; without damage, the solver's own array."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -89,7 +89,7 @@ class ContactProblem:
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """Return C / C_0 (k, 3) for pulled and for pressed bonds; None if all are 1."""
+        """Return C / C_0 (k, 3) of pulled and of pressed bonds, kept for the last `bonds`; None if all are 1."""
         if self._last and self._last[0][0] is bonds:
             return self._last[0][1]
         factors = None
@@ -101,7 +101,7 @@ class ContactProblem:
         return factors
 
     def _gained(self, bonds: BondState) -> Float:
-        """Return C - C_0 (k,) of damaged normal springs; 0 at other nodes and in the axial problem."""
+        """Return the compliance C - C_0 (k,) that damage adds to normal springs; 0 without damage or normal springs."""
         factors = self._factors(bonds)
         if factors is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(bonds.status))
@@ -109,11 +109,15 @@ class ContactProblem:
         return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
-        """Mark the damaged bonds (k,), which are softer in tension than in compression."""
+        """Mark the bonds (k,) with normal springs that are softer in tension than in compression, due to damage."""
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Part bonds `which` (k,); return status (k,): with `contact` CLOSED if `lam` (owned rows,) < 0, else OPEN."""
+        """Return the statuses (k,) after the bonds in the mask `which` (k,) part.
+
+        With `contact`, nodes whose normal multiplier in `lam` (owned rows,) is negative, a pressure, become CLOSED; all
+        other parted nodes become OPEN.
+        """
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -151,7 +155,7 @@ class ContactProblem:
     def completed(self, state: Equilibrium) -> Equilibrium:
         """Return the state with jumps and rigid-body amplitudes alpha, from its multipliers.  Collective.
 
-        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha stays unchanged.
+        Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha is returned itself.
         """
         if state.solution.alpha is not None:
             return state
@@ -159,7 +163,7 @@ class ContactProblem:
         return replace(state, solution=self._place_free_fibres(state.bonds, self.solver.completed(state.solution))[0])
 
     def is_linear(self, status: Status) -> bool:
-        """Return whether contact cannot change: no faces are debonded, or faces may overlap.  Collective."""
+        """Return whether contact states cannot change: no faces are debonded, or faces may overlap.  Collective."""
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
@@ -172,7 +176,7 @@ class ContactProblem:
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Find statuses and solution under a load, from guessed bonds and multipliers `start`.  Collective.
 
-        Closes the open faces if they do not carry the load.  Raises like `linear` and `FloatingBodies.place`.
+        If open faces do not carry the load, a second search closes them.  Raises like `linear`, `FloatingBodies.place`.
         """
         try:
             return self._search(load, bonds, start)
@@ -208,7 +212,7 @@ class ContactProblem:
             bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """Mark strains (v,) that debonding leaves free under prescribed stresses; none with friction.  Collective."""
+        """Mark strains (v,) that debonded faces leave free under given stresses; none with friction.  Collective."""
         has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
         if has_history or not by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(by_stress), bool)
@@ -222,7 +226,7 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _place_free_fibres(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Move free fibres until no faces overlap, and mark open nodes (k,) that squeeze a fibre.  Collective.
+        """Move free fibres to open all overlaps, and mark open nodes (k,) that squeeze a fibre.  Collective.
 
         Return the solution with new alpha and jumps, and the mask (k,).  Raises like `FloatingBodies.place`.
         """
@@ -240,8 +244,8 @@ class ContactProblem:
     def _violations(self, bonds: BondState, solution: DualSolution) -> Bool:
         """Mark the nodes (k,) that violate gap >= 0 or pressure >= 0 beyond the solver's error.  Collective.
 
-        The status of a debonded node selects the condition.  A damaged bond needs tension if the bond counts as pulled,
-        and pressure if the bond counts as pressed.
+        The status of a debonded node selects the condition.  A damaged bond must be in tension if it counts as pulled,
+        under pressure if it counts as pressed.
         """
         status, damaged = bonds.status, self.damaged(bonds)
         if not self.contact and not self._any(damaged):
@@ -259,7 +263,7 @@ class ContactProblem:
         """Return the final state with the certificate and the number of free rigid motions.  Collective.
 
         Bonds and pressed faces resist motions.  Closed nodes without a force hold no fibre, and become open if a fibre
-        is free without these nodes.  If there is room, this fibre then takes the position with least squared jumps.
+        is free without these nodes.  If there is room, this fibre then moves to the least sum of squared jumps.
         """
         asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)

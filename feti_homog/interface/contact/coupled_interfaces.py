@@ -4,9 +4,10 @@ Phases are symmetric about x3 = 0, so the problems share only the bonds: the pla
 debonded node carries no traction along the fibre.
 
 The damaged fraction of a bond has friction (Alfano & Sacco, 2006).  At damage d, slip s and stiffness K, the fraction
-1 - d bears (1 - d) K s, and the fraction d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.
-With g = d s_i, the bond is the intact spring in series with a face that has the jump g, the spring 1 / (C - C_0) and
-the extra force f: lam = g / (C - C_0) + f, s = C_0 lam + g.  `DualSolution.jump` of the bond is r = s - C lam.
+1 - d bears (1 - d) K s.  The fraction d slides by s_i and bears f = K (s - s_i), bounded by Coulomb's law with the full
+pressure.  With g = d s_i and spring compliances C, intact C_0, the bond is the intact spring in series with a face with
+the jump g, the spring 1 / (C - C_0) and the force f: lam = g / (C - C_0) + f, s = C_0 lam + g.  `DualSolution.jump` is
+r = s - C lam.
 """
 
 from collections.abc import Sequence
@@ -93,7 +94,7 @@ class CoupledInterfaces:
 
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
-    """Return r = s - C lam (owned rows,) in tangential rows of damaged bonds; 0 elsewhere and without friction."""
+    """Return r = s - C lam (owned rows,), by which slips of damaged bonds exceed their springs' slips; elsewhere 0."""
     r = np.zeros(interface.solver.rows)
     if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
         rows = interface.nodes.row[state.status == BONDED] + 1
@@ -103,9 +104,9 @@ def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
-    """Return twice the energy in damaged bonds on this rank, minus lam C lam.
+    """Return by how much twice the energy of this rank's damaged bonds exceeds lam C lam; 0 without friction.
 
-    Twice the energy, C_0 lam^2 + g^2 / (C - C_0), exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
+    Twice the energy of a bond, C_0 lam^2 + g^2 / (C - C_0), exceeds lam C lam by r^2 / (C - C_0) + 2 r lam.
     """
     r, gained = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
     rows = np.flatnonzero(r)
@@ -113,7 +114,7 @@ def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> floa
 
 
 def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
-    """Return the traction (k, c) in the intact fraction of bonds; a damaged bond has the shear force s / C there."""
+    """Return the traction (k, c) in the intact fraction of bonds, where a damaged bond has the shear force s / C."""
     traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
     nodes = np.flatnonzero(r)
     C = state.solution.compliance[cell.nodes.row[nodes] + 1]

@@ -1,7 +1,7 @@
-"""Positions of free fibres: rigid motions that open all gaps, or the nodes that squeeze a fibre.
+"""Find positions of free fibres without overlap, or the nodes that squeeze a fibre.
 
-The gaps of a free fibre are unique up to rigid motions M a.  The fibre has room if amplitudes a exist with
-gap + M a >= 0.  A linear programme for each fibre, solved on rank 0, decides.
+Gaps around a free fibre are unique up to the gaps M a of rigid motions with amplitudes a.  The fibre has room if some a
+satisfy gap + M a >= 0.  A linear programme for each fibre, solved on rank 0, decides.
 """
 
 from __future__ import annotations
@@ -39,13 +39,14 @@ LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolera
 
 @dataclass(frozen=True)
 class _Fibres:
-    """All k interface nodes on rank 0, and their free rigid motions.
+    """All k interface nodes of all ranks, gathered on rank 0, and the free rigid motions of fibres.
 
     Attributes:
         is_open: (k,) open nodes.
         opening: (k, motions) gaps that the free motions open.
         reach: (motions,) largest gap or slip of each motion at any node, open or not.
-        fibre: (k,) number of the fibre; a fibre and its coating share a number, and so do neighbouring layers.
+        fibre: (k,) number of the fibre; bodies that share an interface, such as a fibre and its coating, share a
+            number.
     """
 
     is_open: Bool
@@ -75,7 +76,7 @@ class _Fibres:
     def place(self, gap: Float, noise: float) -> tuple[Float, Bool]:
         """Compute the motions of overlapping fibres, and the nodes that squeeze a fibre, from gaps (k,).
 
-        Return amplitudes (motions,), 0 for other fibres, and a mask (k,).  Raises ConvergenceError like `_maximised`.
+        Return amplitudes (motions,), 0 for other fibres, and the mask (k,) of nodes.  Raises like `_maximised`.
         """
         squeezes, amplitudes = np.zeros(len(gap), bool), np.zeros(self.opening.shape[1])
         for node, motion, columns, modes in self.nodes_and_motions(gap < -noise):
@@ -108,7 +109,7 @@ class _Fibres:
 
 @dataclass(frozen=True)
 class FloatingBodies:
-    """The free fibres and this rank's open nodes (k,); gaps below `noise` may be the solver's error."""
+    """Free fibres that may move between this rank's nodes `is_open` (k,); gaps up to `noise` may be solver errors."""
 
     comm: MPI.Intracomm
     coarse: natural.NaturalCoarseSpace
@@ -124,7 +125,7 @@ class FloatingBodies:
         fibre, and have to close.  Raises ConvergenceError on every rank if HiGHS does not solve a linear programme.
 
         Returns:
-            Amplitudes (dimension,) to add to alpha, and the mask (k,) of open nodes that squeeze a fibre.
+            Amplitudes (kernel dimension,) to add to alpha, and the mask (k,) of open nodes that squeeze a fibre.
         """
         gap = solution.jump[self.nodes.row]
         if not self.comm.allreduce(bool((self.is_open & (gap < -self.noise)).any()), MPI.LOR):
@@ -146,7 +147,7 @@ class FloatingBodies:
         return self._on_root(_Fibres.shares, before, after)
 
     def _on_root(self, decide: Callable[..., T], *gaps: Float) -> T:
-        """Return decide(fibres, *gaps, noise) from rank 0, with the gaps of all ranks, on every rank.  Collective."""
+        """Call `decide` on rank 0, with fibres, gaps of all ranks and noise; return the result on all.  Collective."""
         free = self.coarse.unconstrained_modes.tocsr()
         opening, slip = ((self.coarse.G[self.nodes.row + i] @ free).tocsr() for i in range(2))
         reach = np.zeros(free.shape[1])
@@ -180,7 +181,7 @@ def shares_to_zero(before: Float, after: Float, noise: float | Float) -> tuple[f
 
 
 def _last_share(before: Float, after: Float, motion: Float, slack: float) -> float:
-    """Maximize w in [0, 1] with (1 - w) before + w after + motion a >= -slack over w and amplitudes a; return w."""
+    """Return the largest w in [0, 1] for which amplitudes a give (1 - w) before + w after + motion a >= -slack."""
     scale, size = np.abs([before, after]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (before - after) / scale, (before + slack) / scale, (0.0, 1.0))
     return float(result.x[-1])

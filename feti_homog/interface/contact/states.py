@@ -128,7 +128,7 @@ class Equilibrium:
 def kkt_errors(
     scales: LoadScales, traction: Float, gap: Float, debonded: Bool, closed: Bool, acting: Float
 ) -> dict[str, float]:
-    """Measure the largest relative violations of the KKT conditions on debonded faces.  Collective.
+    """Measure the largest violations of the KKT conditions on debonded faces, absolute if no load acts.  Collective.
 
     `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
     the normal traction of a closed node relative to the largest traction on the interface.  `kkt_complementarity`
@@ -157,9 +157,9 @@ def kkt_errors(
 
 
 def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
-    """Measure the violation (k,) of Coulomb's law by each node's tractions.
+    """Measure by how much each node's tractions (k,) violate Coulomb's law.
 
-    The law is |t| <= mu p in stick and t = s mu p in slip; along the fibres, without friction, any shear violates it.
+    For shear t and pressure p: |t| <= mu p in stick, t = s mu p in slip; along the fibres any shear violates the law.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.

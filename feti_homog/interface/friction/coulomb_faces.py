@@ -30,7 +30,7 @@ class StuckError(NotCarriedError):
 
 
 class CoulombFaces(FaceSystem):
-    """Debonded faces with Coulomb friction: a status (n,) for each node, and forces and jumps by scaled x (m,)."""
+    """Debonded faces with Coulomb friction, each with a status (n,); forces and jumps follow from scaled x (m,)."""
 
     def search(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
         """Find admissible statuses (n,) and scaled x from a first guess; arguments as in `StatusSearch`.
@@ -47,19 +47,19 @@ class CoulombFaces(FaceSystem):
         return found
 
     def all_allowed(self) -> Bool:
-        """Return the mask (n, 4) of all statuses; without friction, a face may only be open or FORWARD."""
+        """Return the mask (n, 4) of possible statuses: all four or, without friction, only OPEN_FACE and FORWARD."""
         allowed = np.ones((self.nodes, 4), bool)
         allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
         return allowed
 
     def _known(self, status: Status) -> Status:
-        """Return the statuses (n,) with FORWARD at touching faces without friction."""
+        """Return a copy of the statuses (n,) in which touching faces without friction are FORWARD."""
         return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
-        """Find the next statuses (n,), and the rate (m,) of the state x under a load rate (v,).
+        """Find the next statuses (n,) and the rate (m,) of x under a load rate (v,).  Raises as `step` does.
 
-        Raises NotCarriedError and StuckError as `step` does.
+        A second search, if the first fails, also takes faces of a nearly unloaded cell for faces at limits.
         """
         load, status, start = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status), np.zeros(len(x))
         noise = self.noise(x)
@@ -81,7 +81,7 @@ class CoulombFaces(FaceSystem):
         return self._resisting(status, self.all_allowed(), load, start)
 
     def carries(self, status: Status, load: Prescribed, start: Float) -> bool:
-        """Return whether `step` would find admissible statuses, with any det M."""
+        """Return whether `search` finds admissible statuses under a load, even if det M (`status_system`) < 0."""
         try:
             self.search(status, self.all_allowed(), load, start)
         except NotCarriedError:
@@ -89,7 +89,7 @@ class CoulombFaces(FaceSystem):
         return True
 
     def _resisting(self, status: Status, allowed: Bool, load: Prescribed, start: Float) -> tuple[Status, Float]:
-        """Find admissible statuses for which det M is not negative, and x; arguments as in `search`.
+        """Find admissible statuses (n,) for which det M is not negative, and x (m,); arguments as in `search`.
 
         A pinched fibre jams if all faces that pinch it stick, and snaps through, with a negative stiffness, if one of
         these faces slides: both sets of statuses are admissible.  Raises NotCarriedError and StuckError as `step` does.
@@ -103,7 +103,7 @@ class CoulombFaces(FaceSystem):
         return result
 
     def _at_limits(self, status: Status, x: Float, noise: Float) -> Bool:
-        """Return the mask (n, 4) of allowed statuses: present statuses and, at limits up to `noise`, the next ones."""
+        """Return the mask (n, 4) of allowed statuses: the present ones and, at limits up to `noise`, the next ones."""
         closed = status != OPEN_FACE
         normal, tangential = self.forces(x)
         allowed = np.zeros((self.nodes, 4), bool)
@@ -122,17 +122,17 @@ class CoulombFaces(FaceSystem):
         return float((np.maximum(rooms[falls], 0.0) / -rates[falls]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of a straight path at fixed statuses: mean friction forces times slips, at sliding nodes."""
+        """Return the frictional heat of a straight path at fixed statuses: mean forces times slips at sliding nodes."""
         sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
         return float((tangential * (after - before)[self.slips])[sliding].sum())
 
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
-        """Return the energy lost on the straight path between states x at constant load, and the heat in this loss."""
+        """Return the energy lost by faces on a straight path between states x at constant load, and the heat in it."""
         forces = -(self.product(before) + self.product(after)) / 2
         forces[self.loads] = 0.0
         return float(forces @ (after - before)), self.heat_behind(status, before, after)
 
     def heat_behind(self, status: Status, before: Float, after: Float) -> float:
-        """Return the heat of an implicit step: final friction forces times slips, at sliding nodes."""
+        """Return the frictional heat of an implicit step: final forces times slips at sliding nodes."""
         slips = (after - before)[self.slips]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())

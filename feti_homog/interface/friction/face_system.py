@@ -52,7 +52,7 @@ class FaceSystem:
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """Scale the stiffness (m, m) of n pairs of jumps (normal, tangential), then v loads: m = 2n + v."""
+        """Scale the stiffness (m, m), m = 2n + v, of n jumps (normal, tangential), then v loads; `friction` is (n,)."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction, self.nodes = friction, n
         self.gaps, self.slips, self.loads = slice(0, 2 * n, 2), slice(1, 2 * n, 2), slice(2 * n, len(stiffness))
@@ -72,9 +72,9 @@ class FaceSystem:
         return f[self.gaps], f[self.slips]
 
     def rooms(self, status: Status, x: Float, slip: Float | float, pressure: Float | float) -> Float:
-        """Return the force or jump (4, n) between each node and another status; inf without a direct change to it.
+        """Return the force or jump (4, n) that separates each node from each next status; inf if none leads there.
 
-        The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with the added
+        The rows [STICK, FORWARD, OPEN_FACE, BACKWARD] are s (g_t - slip), mu p - f_t, p and mu p + f_t, with added
         pressure; g_n is the room of an open node, in the row STICK.
         """
         normal, tangential = self.forces(x)
@@ -91,7 +91,7 @@ class FaceSystem:
         )
 
     def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
-        """Take over the response of `before`, useless afterwards, if `FollowedStatuses.grow(old, other)` extends it."""
+        """Take over the response of `before`, which is then useless, if `FollowedStatuses.grow` can extend it."""
         units = before.size / self.size[old]
         if before._followed is None:
             self._factored = before._factored
@@ -99,7 +99,7 @@ class FaceSystem:
             self._followed = before._followed
 
     def terms(self, x: Float) -> Float:
-        """Return sum_j |S_ij x_j| (m,), the rounding scale of S x, in single precision."""
+        """Return the scale (m,) of rounding in S x, in single precision: sum_j |S_ij x_j|."""
         largest = float(np.abs(x).max(initial=0.0)) or 1.0
         return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
@@ -111,7 +111,7 @@ class FaceSystem:
         return self.keep(x, self.S @ x)
 
     def keep(self, x: Float, y: Float) -> Float:
-        """Store y as the product S x, and return y."""
+        """Store y (m,) as the product S x, and return y."""
         self._products.append((x, y))
         return y
 
@@ -168,7 +168,7 @@ class FaceSystem:
         return float(UNBALANCED * self._sizes(status, load).max(initial=0.0))
 
     def _sizes(self, status: Status, load: Prescribed) -> Float:
-        """Bound the forces (m,) of prescribed loads and slips at each node, and at its neighbours in S."""
+        """Bound the forces (m,) that prescribed loads and slips cause at each node and at its neighbours in S."""
         # Only prescribed entries: a free motion in x is as large as its force divided by the stiffness HELD.
         fixed, rows = np.zeros((2, len(self.S)))
         rows[self.loads] = load.values
@@ -177,7 +177,7 @@ class FaceSystem:
         return np.asarray(np.abs(rows) + self.terms(self.terms(fixed)))
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
-        """Return x (m,) with `start` in free entries, and the right-hand side (m,): loads, and added pressures."""
+        """Return x (m,), with `start` in free entries, and the right-hand side (m,): loads and added pressures."""
         x, rows = start.copy(), np.zeros(len(start))
         x[self.gaps] = np.where(status == status_system.OPEN_FACE, x[self.gaps], 0.0)
         x[self.slips] = np.where(status == status_system.STICK, load.slip, x[self.slips])
@@ -188,6 +188,6 @@ class FaceSystem:
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """Return the rounding error (n,) in the scaled force and jump of each node."""
+        """Return the rounding error (n,) of the scaled forces and jumps at each node."""
         terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
         return np.asarray(status_system.NOISE * terms.max(axis=1, initial=0.0))

@@ -37,7 +37,7 @@ class CondensedProblem:
     """
 
     def __init__(self, interface: ContactProblem) -> None:
-        """Compute the response of the bonded cell to unit loads.  Collective; raises CaseError without an inverse."""
+        """Compute the bonded cell's response to unit loads.  Collective; raises CaseError without an `ExactInverse`."""
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
             raise CaseError(solver_plan.WITHOUT_INVERSE)
@@ -59,7 +59,7 @@ class CondensedProblem:
         return K, distributed_arrays.gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
 
     def gained(self, bonds: BondState) -> Float:
-        """Return the compliance (k, c) that damage adds to springs under tension."""
+        """Return the compliance (k, c) that damage adds to the c springs of each bond in tension."""
         interface, pulled = self.interface, replace(bonds, pressed=np.zeros(len(bonds.status), bool))
         increase = interface.compliance(pulled) - self.solver.intact_compliance
         return np.asarray(increase[self.rows_of(slice(None))])
@@ -69,7 +69,7 @@ class CondensedProblem:
         return self.interface.nodes.row[node][:, None] + np.arange(self.solver.jump_operator.components)
 
     def multipliers(self, jump: Float, strain: Float) -> Float:
-        """Return lam (owned rows,) under jumps (n,) in the condensed rows and strains (v,)."""
+        """Return the multipliers lam (owned rows,) under jumps (n,) in the rows D and strains (v,)."""
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, rows: Int, jump: Float, strain: Float) -> Float:
@@ -79,7 +79,7 @@ class CondensedProblem:
         return self._response[rows] @ strain - (self._some[1] @ jump).reshape(rows.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
-        """Return the dual solution under jumps (n,) and strains (v,); its jumps follow from F lam.  Collective."""
+        """Return the dual solution under jumps (n,) and strains (v,); all jumps follow from lam.  Collective."""
         solver, lam = self.solver, self.multipliers(jump, strain)
         torn = solver.d @ strain
         jumps, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
@@ -97,10 +97,9 @@ class CondensedProblem:
 
 
 class AxialFaces:
-    """The axial part of the matrix S of `coulomb_faces`, with eliminated jumps g = K^-1 b E.
+    """The axial part of the matrix S of `coulomb_faces`, in which axial jumps g = K^-1 b E are eliminated.
 
-    K is H_DD with springs.  A weak spring holds each row.  The spring's stiffness is HELD times the diagonal entry of K
-    in the same row, because entries in other rows may be far larger.
+    K is H_DD with springs; weak springs of HELD times the diagonal entry of K hold the rows.
 
     Attributes:
         problem: condensed axial problem.
@@ -210,7 +209,7 @@ class SlidingCell:
         return float(x @ self.faces.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
-        """Return the energy per area in the springs 1 / (C - C_0) of damaged bonds in the plane."""
+        """Return the energy per area in the plane springs 1 / (C - C_0) of damaged bonds in the state x."""
         return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.cell.area)
 
     def _jumps_of(self, x: Float) -> Float:
@@ -218,7 +217,7 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """Return the tractions in the intact fraction of bonds, (k, 2), or (k, 3) with the axial one; 0 if debonded."""
+        """Return tractions (k, c) in the intact fraction of bonds, with the axial one if c = 3; 0 at debonded nodes."""
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *answer) for rows, (problem, answer) in parts])
@@ -229,13 +228,13 @@ class SlidingCell:
         return np.asarray(force / self.interface.nodes.length[:, None])
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
-        """Return each condensed problem with its unscaled jumps and strains in x."""
+        """Return each condensed problem with its unscaled jumps (n,) and strains (v,) in x."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
         axial = [(faces.problem, (faces.jumps @ along, along)) for faces in self._along]
         return [(self._plane, (jump, plane)), *axial]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
-        """Return the axial energy per area that a break at constant load releases."""
+        """Return the energy per area that a break at constant load releases in the axial problem, if any."""
         axial = [Macroscopic(state.strain[self._loads :], state.stress[self._loads :]) for state in (before, after)]
         return axial[0].released_to(axial[1])
 
@@ -245,15 +244,15 @@ class SlidingCell:
         return Macroscopic((x / size)[loads], (self.faces.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
-        """Return the values (v,) of a load in the units of x and S x."""
+        """Return the prescribed values (v,) of a load: strains scaled like x, stresses scaled like S x."""
         size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
         """Return the equilibrium in state x under the last of `loads`.  Collective.
 
-        All `loads` scale the certificate; `kkt_friction` is the largest of `coulomb_errors` relative to the largest
-        traction.
+        Errors are relative to the largest effects of all `loads`; `kkt_friction` is the largest of `coulomb_errors`
+        over the largest traction.
         """
         of_problems = list(zip(*map(self.cell.parts, loads), strict=True))
         scales, asked = [problem.scales for problem in self.cell.problems], list[Float]()

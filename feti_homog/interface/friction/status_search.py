@@ -59,7 +59,7 @@ class StatusSearch:
         return None, False
 
     def _improved(self, status: Status, x: Float) -> Status:
-        """Return the allowed statuses (n,) that the signs of the forces and jumps in x require."""
+        """Return statuses (n,) in which each node that violates a condition has the allowed status that mends it."""
         rooms, noise = self._rooms(status, x), self.faces.noise(x)
         better, wrong = status.copy(), rooms < -noise
         wrong[STICK] &= rooms[OPEN_FACE] > noise  # without pressure, a slip may have either sign
@@ -71,9 +71,10 @@ class StatusSearch:
     def by_lemke(self) -> Found:
         """Search by Lemke's method: admissible statuses under an added pressure that falls to zero.
 
-        Under a large added pressure d t, all faces that may touch stick or, without friction, are FORWARD.  As t falls,
-        one node after another has to change its status; t then goes on, down or up, as the new status admits.  At the
-        end det M >= 0 (`status_system`).  None: t rises without end, after SOLVES + 4 n changes, or as in `_balanced`.
+        The added pressure is t d, with random d by node.  At large t, all faces allowed to touch are STICK or, without
+        friction, FORWARD.  As t falls, nodes change their statuses one by one; after a change t goes on, down or up, as
+        the new status admits.  At the end det M >= 0 (`status_system`).  Returns None if t rises without end, after
+        SOLVES + 4 n changes, or as in `_balanced`.
         """
         faces, load, rest = self.faces, self.load, np.zeros(len(self.start))
         # Nodes of a symmetric cell would reach limits together under equal pressures.
@@ -113,13 +114,13 @@ class StatusSearch:
         return result if balanced else None
 
     def _rooms(self, status: Status, x: Float, pressure: Float | float = 0.0) -> Float:
-        """Return the rooms (4, n) of `FaceSystem.rooms` up to allowed statuses; inf for others."""
+        """Return the `FaceSystem.rooms` (4, n) up to allowed statuses; inf up to other statuses."""
         enters = self.allowed.T.copy()
         enters[STICK] |= self.allowed[:, FORWARD]  # an open face without friction closes to FORWARD
         return np.where(enters, self.faces.rooms(status, x, self.load.slip, pressure), np.inf)
 
     def _entered(self, target: FaceStatus, status: Status, x: Float) -> Status:
-        """Return new statuses (n,) for nodes without room up to `target`; closing faces slide as their slips grew."""
+        """Return statuses (n,) of nodes that reach the limit `target`; closing faces slide in the slip's direction."""
         if target != STICK:
             return np.full_like(status, target)
         slip = x[self.faces.slips] - self.load.slip

@@ -58,7 +58,7 @@ def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, F
 
 
 def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
-    """Return the residual (m,) of rows `rhs` for the product y = S x (m,), 0 in prescribed rows."""
+    """Return rhs - M x (m,) from the product y = S x (m,); 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
     missing = rhs - y
     missing[sliding] -= slope[sliding] * y[sliding - 1]
@@ -66,7 +66,7 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of the absolute residuals (m,), each relative to the terms (m,) of its row."""
+    """Return the largest absolute residual (m,) relative to the `terms` (m,) of its row, see `FaceSystem.terms`."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
@@ -163,13 +163,13 @@ class FollowedStatuses:
         self._forget()
 
     def _forget(self) -> None:
-        """Drop all changes that wait to be added to R."""
+        """Drop all changes that have not been added to R, and allocate room for new ones."""
         capacity = self._R.shape[1]
         self._U, self._V = np.zeros((2, capacity, MOST_CHANGES)), np.zeros((MOST_CHANGES, capacity))
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Exchange all rows of M that differ from the arguments; return False if tiny pivots leave some unchanged."""
+        """Exchange the rows of M that differ from the arguments; return False if tiny pivots leave some unexchanged."""
         pending, size = np.flatnonzero((free != self.free) | (slope != self.slope)).tolist(), self._size
         while pending:
             failed = []
@@ -196,19 +196,19 @@ class FollowedStatuses:
         return True
 
     def _row(self, kind: int, at: int) -> Float:
-        """Return the row (m,) at position `at` of M^-1 if `kind` is 0, of S M^-1 if `kind` is 1."""
+        """Return row `at` (m,) of M^-1 if `kind` is 0, of S M^-1 if `kind` is 1."""
         count, size = self._count, self._size
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
 
     def _flush(self) -> None:
-        """Add the waiting changes to R."""
+        """Add the collected changes to R."""
         size, count = self._size, self._count
         for kind in range(2 if count else 0):
             self._R[kind, :size, :size] -= self._U[kind, :size, :count] @ self._V[:count, :size]
         self._count = 0
 
     def _inverse(self, c: Float) -> Float:
-        """Return M^-1 c (m,)."""
+        """Return the solution M^-1 c (m,) for a right-hand side c (m,)."""
         size, permuted = self._size, np.empty(self._size)
         permuted[self._index] = c
         nonzero = np.flatnonzero(permuted)
@@ -235,7 +235,7 @@ class FollowedStatuses:
         return (x, y) if error <= NOISE else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Add prescribed entries; the present entries get the indices `old` (m,) in S (m', m').
+        """Add prescribed entries to x; the present entries get the indices `old` (m,) in S (m', m').
 
         New scales multiply the entries of S by units_i units_j, with `units` (m,); S also changes between the entries
         with the indices `other`.  Return False if a pivot is too small; R is then useless.

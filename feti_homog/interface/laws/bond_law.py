@@ -32,7 +32,7 @@ Sections = Sequence[interface_section.InterfaceSection]
 class SectionValues:
     """The values of [interface] keys at nodes (k,) in the sections `bonds`, with section indices `pair` (k,).
 
-    The factor (k,) of the fibre at each node multiplies strengths; the square of this factor multiplies toughnesses.
+    Strengths are multiplied by `factor`, a number or (k,), of the node's fibre, and toughnesses by `factor` squared.
     """
 
     bonds: Sections
@@ -40,14 +40,14 @@ class SectionValues:
     factor: float | Float
 
     def __call__(self, key: str, *more: str) -> float | Float:
-        """Return the value of the first key that a section sets, a number or (k,); inf if the section sets none."""
+        """Return the value of the first key that each node's section sets, a number or (k,); inf if it sets none."""
         sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
         return values * self.factor**power if power else values
 
     def everywhere(self, key: str, *more: str) -> Float:
-        """Return the values (s,) in all s sections, for the factor 1, equal on every rank; (inf,) without sections."""
+        """Return the value (s,) of the first key set in each of s sections, without factors; (inf,) for no sections."""
         values = []
         for bond in self.bonds:
             candidates = [getattr(bond, name) for name in (key, *more)]
@@ -55,13 +55,13 @@ class SectionValues:
         return np.array(values or [math.inf], float)
 
     def common(self, key: str) -> Any:
-        """Return the value of a key that is equal in all sections."""
+        """Return the value of a key that must be equal in all sections."""
         return getattr(self.bonds[0], key)
 
 
 @dataclasses.dataclass(frozen=True)
 class BondLaw(ABC):
-    """A law for all bonds of a cell, with defaults for laws without memory.
+    """Base class of bond laws, for all bonds of a cell, with defaults for laws without memory.
 
     Attributes:
         has_toughness: whether bonds have a fracture energy, see `fracture`.
@@ -85,12 +85,12 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """Return the mode of breaks (p, d) under tractions (p, c): shares of strengths, or mode angles in degrees."""
+        """Return modes of breaks under tractions (p, c): component utilisations (p, c), or angles (p, 1) in degrees."""
 
     @classmethod
     @abstractmethod
     def of_keys(cls, value: SectionValues) -> Self:
-        """Make the law from the values of keys in [interface]."""
+        """Make the law from the values of its [interface] keys."""
 
     def at(self, node: Int) -> Self:
         """Return the law at the nodes with indices (p,)."""
@@ -106,7 +106,7 @@ class BondLaw(ABC):
         return self
 
     def convex(self, p: int) -> Bool:
-        """Return the mask (p,) of nodes where `share` is convex, for a law at `p` nodes."""
+        """Return the mask (p,) of nodes at which `share` is a convex function of the traction."""
         return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
@@ -117,17 +117,14 @@ class BondLaw(ABC):
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """Return the compliance ratio C / C_0 (k, 3) to undamaged springs; None if C never changes.
+        """Return the ratio C / C_0 (k, 3) of spring compliance with and without damage; None if C never changes.
 
         Springs are in tension at the nodes in the mask `pulled` (k,), else in compression.
         """
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """Return the fracture energies per area (p,) of the p bonds in the mask `which` (k,); 0 without toughness.
-
-        The tractions (k, c) determine the mode of each bond.
-        """
+        """Return the fracture energy per area (p,) of p bonds `which` (k,) at tractions (k, c); 0 without toughness."""
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:
@@ -136,7 +133,7 @@ class BondLaw(ABC):
 
     @property
     def overshoot(self) -> float:
-        """The relative excess of the first break's traction over the peak of the law; 0 without teeth."""
+        """The fraction by which the traction of the first break exceeds the peak of the law; 0 without saw teeth."""
         return 0.0
 
     def onset(self) -> BondLaw:
@@ -162,7 +159,7 @@ class BondLaw(ABC):
     def crossing(self, before: Float, direction: Float, low: Float, high: Float) -> Float:
         """Find the load factors f (p,) at which bonds break, by bisection of [`low`, `high`] (p,).
 
-        A bond breaks under `before` + f `direction` (p, c); a factor `high` that is too low is doubled first.
+        A bond breaks under `before` + f `direction` (p, c), not at `low`; a factor `high` without a break is doubled.
         """
         high = high.copy()
         for _ in range(MOST_STEPS):
@@ -178,7 +175,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """A law in which bonds break at an energy of the undamaged springs that depends on the mode.
+    """Base class of laws in which bonds break at an energy of undamaged springs that depends on the mode.
 
     A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 
@@ -202,7 +199,7 @@ class SpringLaw(BondLaw):
         return np.asarray(opening), np.asarray(slip)
 
     def mode_angle(self, traction: Float) -> Float:
-        """Return the mode angle psi (p,) in radians of tractions (p, c): slip has sin^2 psi of the spring energy."""
+        """Return the mode angle psi (p,) in radians of tractions (p, c): slip takes sin^2 psi of the spring energy."""
         opening, slip = self.energies(traction)
         return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
 
@@ -219,6 +216,6 @@ def law_class(name: str) -> type[BondLaw]:
 
 
 def law_of_sections(bonds: Sections, pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Make the bond law from the arguments of `SectionValues`; without sections no bond breaks."""
+    """Make the bond law at nodes from the arguments of `SectionValues`; without sections no bond breaks."""
     name = bonds[0].criterion if bonds else bond_laws.DEFAULT
     return law_class(name).of_keys(SectionValues(bonds, pair, factor))

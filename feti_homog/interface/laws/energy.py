@@ -32,12 +32,12 @@ RIGID = 1e-9
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """The law in which a bond breaks when its spring energy reaches the toughness.
+    """The law in which a bond breaks when its spring energy reaches the toughness G_c of its mode angle psi.
 
         G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
-        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
+        G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)],
 
-    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
+    with normal traction t_n, <x> = max(x, 0), shear t_t; along the fibre t_a adds G_III = t_a^2 / (2 k_a) to G_II.
 
     Attributes:
         toughness: G_Ic, energy per area.
@@ -64,7 +64,7 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """Return the factor sqrt(G_Ic / G_c) (p,) for the modes of tractions (p, c)."""
+        """Return sqrt(G_Ic / G_c) (p,), by which the mode of tractions (p, c) reduces the utilisation."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
@@ -86,7 +86,7 @@ class SpringEnergy(SpringLaw):
 
 @dataclass(frozen=True)
 class TipEnergies:
-    """The debonding tips of this rank: t intact bonds beside broken bonds.
+    """Data for the released energies at this rank's t debonding tips, which are intact bonds beside broken bonds.
 
     Attributes:
         H: (t, 2, 2) diagonal blocks of the inverse dual operator.
@@ -105,7 +105,7 @@ class TipEnergies:
 class ReleasedEnergy(SpringEnergy):
     """The law in which bonds at tips break by the released energy.
 
-    A bond at a tip breaks when its break releases G_c l, with tributary length l; another bond breaks when its spring
+    A bond at a tip breaks when its break releases G_c l, with tributary length l; other bonds break when their spring
     energy reaches G_c.
 
     Attributes:
@@ -164,7 +164,7 @@ class ReleasedEnergy(SpringEnergy):
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAndTips(SpringEnergy):
-    """The law in one bond state: sqrt(released / (G_c l)) at tips, the spring criterion at other nodes.
+    """The law in one bond state: utilisation sqrt(released energy / (G_c l)) at tips, as in `SpringEnergy` elsewhere.
 
     Attributes:
         tips: tips of this rank.
@@ -191,12 +191,12 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """Return the mask (p,) of nodes with convex `share`: all but tips, where energies need not be subadditive."""
+        """Return the mask (p,) of nodes with convex `share`: all but tips, whose energies need not be convex."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """Return the released energy (m,) of each break, from blocks H (m, 2, 2) and forces `lam` (m, 2).
+    """Return the energy (m,) that each break would release, from blocks H (m, 2, 2) and forces `lam` (m, 2).
 
     `stiffness` (m, 2) bounds the diagonals of H.  Where H is a rounding error relative to this bound, as at the last
     bond of a fibre, no force can act.  With `contact`, faces that would overlap keep the normal force.

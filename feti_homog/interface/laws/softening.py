@@ -38,14 +38,14 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tange
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the constants of a law by `value`, a function of keys; axial stiffness defaults to tangential."""
+    """Return a law's constants by name, from `value`, a function of keys; axial stiffness defaults to tangential."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law with softening, where the history of a bond counts broken teeth.
+    """Base class of laws with softening, in which the history of a bond counts broken teeth; symbols as in the module.
 
     Attributes:
         normal_strength, tangential_strength: N and S.
@@ -70,7 +70,7 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: SectionValues) -> Self:
-        """Make the law and its damage levels from the keys in [interface]."""
+        """Make the law and its damage levels from the keys in [interface].  Raises CaseError as `levels_for` does."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
         # The levels follow from all sections, so that all ranks agree.
         law_of_all = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
@@ -85,9 +85,9 @@ class CohesiveLaw(SpringLaw):
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
         """Choose the damage levels between the teeth.
 
-        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  The default of `teeth`
-        is the least number for which the first tooth exceeds the peak traction by at most the fraction `tolerance`.
-        Raises CaseError if more than MOST_TEETH teeth are necessary.
+        In the pure mode with the largest G_c / W_0, successive openings have a constant ratio.  Without a number
+        `teeth`, take the least number for which the first tooth exceeds the peak traction by at most the fraction
+        `tolerance`.  Raises CaseError if more than MOST_TEETH teeth are necessary.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
@@ -105,7 +105,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _longest_branch(self) -> float:
-        """The largest branch length s over both pure modes and all nodes."""
+        """The largest branch length s, defined in the module, over both pure modes and all nodes."""
         onsets = self._onsets
         ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
         largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))
@@ -113,7 +113,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def overshoot(self) -> float:
-        """The largest relative excess of the first tooth over the peak traction, in pure modes."""
+        """The largest fraction by which, in pure modes, the first tooth exceeds the peak traction."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
@@ -123,15 +123,15 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
-        """Return the relative traction tau(u), which falls from 1, for u >= 0."""
+        """Return the relative traction tau(u) (p,) for u (p,) >= 0, which falls from 1 at u = 0."""
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau."""
+        """Return the integral of tau from 0 to u, for one or many u (p,)."""
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), for damage d < 1."""
+        """Return u (p,) at damage d < 1 on a branch of length s: the root of tau(u) = (1 - d) (1 + s u)."""
 
     def begin(self, k: int) -> Float:
         """Return the numbers of broken teeth (k, 1), zero for `k` intact bonds."""
@@ -142,10 +142,7 @@ class CohesiveLaw(SpringLaw):
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
-        """Return the utilisation sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth.
-
-        The utilisation is homogeneous of degree one because B is independent of the size of the traction.
-        """
+        """Return the utilisation sqrt(W / W_j) (p,) under tractions (p, c) at bonds with j broken teeth."""
         first, second = self.energies(traction)
         tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
@@ -164,7 +161,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """Return C / C_0 = 1 / (1 - d) (k, 3) of springs; 1 for normal springs without tension and for broken bonds."""
+        """Return the ratio C / C_0 = 1 / (1 - d) (k, 3); 1 for broken bonds, and for normal springs without tension."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
@@ -187,12 +184,12 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _onsets(self) -> tuple[float | Float, float | Float]:
-        """The onset energies W_n and W_t."""
+        """The onset energies W_n and W_t, numbers or (p,)."""
         normal, tangential = self.normal_strength, self.tangential_strength
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """Return the breaking energies W_j (p,) of teeth j under tractions (p, c).
+        """Return the spring energies W_j (p,) at which teeth j break under tractions (p, c).
 
         `tooth` has a number j for each bond, or one number for all bonds.
         """
@@ -225,15 +222,15 @@ class PiecewiseLinear(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """The first zero of tau."""
+        """The least argument u at which tau is 0."""
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
-        """Return the relative traction tau(u) for u >= 0."""
+        """Return the relative traction tau(u) (p,) for u (p,) >= 0."""
         return np.interp(u, self.knots, self.heights)
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau."""
+        """Return the integral of tau from 0 to u, for one or many u (p,)."""
         u = np.minimum(u, self.last)
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
@@ -241,7 +238,7 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of tau(u) = (1 - d) (1 + s u), on the piece where the sides change order."""
+        """Return u (p,) at damage d: the root of tau(u) = (1 - d) (1 + s u), on the linear piece that contains it."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
@@ -260,7 +257,7 @@ class BilinearLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class TableLaw(PiecewiseLinear):
-    """A law by a table of tractions over openings in mode I; in other modes s stretches the table to G_c."""
+    """A law by a table of tractions over openings in mode I; in other modes s stretches the table to take G_c."""
 
     @classmethod
     def branch(cls, value: SectionValues) -> dict[str, Any]:
@@ -271,7 +268,7 @@ class TableLaw(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class ExponentialLaw(CohesiveLaw):
-    """A law with tau = exp(-u)."""
+    """A law with a traction that falls exponentially: tau = exp(-u)."""
 
     @property
     def last(self) -> float:
@@ -279,15 +276,15 @@ class ExponentialLaw(CohesiveLaw):
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
-        """Return the relative traction exp(-u)."""
+        """Return the relative traction exp(-u) (p,) for u (p,) >= 0."""
         return np.asarray(np.exp(-u))
 
     def area(self, u: Float | float) -> Float | float:
-        """Return the integral int_0^u tau = 1 - exp(-u)."""
+        """Return the integral of tau from 0 to u, 1 - exp(-u), for one or many u (p,)."""
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """Return the root u (p,) of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
+        """Return u (p,) at damage d: the root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
         for _ in range(MOST_STEPS):

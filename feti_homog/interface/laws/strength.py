@@ -13,11 +13,11 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class Strength(BondLaw):
-    """A criterion that combines the utilisations of the traction components.
+    """Base class of criteria that combine the utilisations of traction components.
 
     Attributes:
         normal, tangential: strengths R^n and R^t, numbers or (p,) at p nodes; inf without a limit.
-        axial: strength R^a along the fibre, as above.
+        axial: strength R^a along the fibre, a number or (p,); inf without a limit.
     """
 
     normal: float | Float
@@ -51,14 +51,14 @@ class Strength(BondLaw):
 
 
 class MaxStrength(Strength):
-    """The criterion of the paper: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1."""
+    """The paper's criterion: a bond breaks at max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1; <x> is max(x, 0)."""
 
     def together(self, shares: Float) -> Float:
         """Return the largest utilisation (p,) among the components (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the first component reaches its strength; as in `BondLaw`."""
+        """Return the load factors (p,) at which a component first reaches its strength; see `BondLaw.first_factor`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         towards = np.abs(ds)
@@ -68,14 +68,14 @@ class MaxStrength(Strength):
 
 
 class QuadraticStrength(Strength):
-    """The quadratic criterion: a bond breaks at (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1."""
+    """The quadratic criterion: (<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1 at a break; <x> is max(x, 0)."""
 
     def together(self, shares: Float) -> Float:
         """Return the root (p,) of the sum of squared utilisations (p, c)."""
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
     def first_factor(self, before: Float, direction: Float) -> Float:
-        """Return the load factors (p,) at which the squared utilisations sum to 1; as in `BondLaw`."""
+        """Return the load factors (p,) at which squared utilisations sum to 1; see `BondLaw.first_factor`."""
         limits = self.limits[..., : before.shape[1]]
         s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])
@@ -85,7 +85,7 @@ class QuadraticStrength(Strength):
 
 
 def _largest_root(s: Float, ds: Float) -> Float:
-    """Return the largest f (k,) with |s + f ds| = 1, for vectors (k, c); NaN without a root, inf for ds = 0."""
+    """Return the largest f (k,) with |s + f ds| = 1, for vectors s, ds (k, c); NaN without a root, inf for ds = 0."""
     a, b, c = (ds * ds).sum(axis=1), (s * ds).sum(axis=1), (s * s).sum(axis=1) - 1.0
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b * b - a * c)

@@ -48,7 +48,7 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Find the state at `begin`.  Collective; a leg from a waypoint reports its first change of statuses."""
+        """Find the state at `begin`.  Collective; on a leg from a waypoint, the first change of statuses is a point."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
@@ -78,18 +78,18 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Return the prescribed load at a leg fraction, with the slips in scaled x."""
+        """Return the load at a leg fraction as `Prescribed`, with slips that start from the state x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[self.sliding.faces.slips])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Set the statuses, x and macroscopic state; add the energies `way` since the last state to the sum."""
+        """Set the statuses, x and macroscopic state; add `way`, the energies since the state before, to the sum."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break, if any.  Collective.
+        """Find the state at leg fraction s with the bonds of `begin`, which a break may have changed.  Collective.
 
         In a break, faces lose the work of the mean forces on the changes of jumps.  The work of the final forces on the
         slips is heat; the break releases the rest.  Raises like `CoulombFaces.search`.
@@ -108,7 +108,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance on a straight path to new statuses and scaled x; add the work and the losses, energies per area."""
+        """Advance on a straight path to new statuses and scaled x; sum up its work and the given energies, per area."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
@@ -161,7 +161,7 @@ class CoulombLeg(Leg):
         sliding, x, faces = self.sliding, self._x, self.sliding.faces
 
         def carried() -> tuple[float, NotCarriedError | None]:
-            """Return the carried leg fraction, and the error beyond it; (`share`, None) also if the step is stuck."""
+            """Return the leg fraction that the cell carries, and the error beyond it or None; `share` if stuck."""
             low, high = self._share, share
             try:
                 faces.step(self._status, self._given(share, x), x)

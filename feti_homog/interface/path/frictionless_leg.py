@@ -72,7 +72,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Set the state at a leg fraction, and add the energies since the last state.  Collective."""
+        """Set the state at a leg fraction, and add the energies since the state before to the sum.  Collective."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -130,7 +130,7 @@ class FrictionlessLeg(Leg):
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
-        """Advance to the target, or to the end of the straight response.  Collective.
+        """Advance to the leg fraction `target`, or to one before it if the response bends.  Collective.
 
         Return whether the leg has reached the target; `end` has the solutions at the end of the leg.
         """
@@ -163,11 +163,11 @@ class FrictionlessLeg(Leg):
         return reached
 
     def _response(self, state: Macroscopic) -> Float:
-        """Return the components (n,) that the load does not prescribe: stresses, or strains times a stiffness."""
+        """Return the components (n,) that the load leaves free: stresses, or strains times the largest stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _turn(self, position: float) -> Point:
-        """Return the state as a point without a break; the path goes on at `position`.  Collective."""
+        """Return a point without a break for the present state; the path continues at `position`.  Collective."""
         return self._point(0, 0, replace(self._path_state(), position=position))
 
     def _differs(self, before: Equilibrium) -> bool:

@@ -51,7 +51,7 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: path_points.PathState) -> None:
-        """Find the state at leg fraction s with the bonds of `begin`, after its break.  Collective."""
+        """Find the state at leg fraction s with the bonds of `begin`, which a break may have changed.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[path_points.Point]:
@@ -69,7 +69,7 @@ class Leg(ABC):
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
     def step(self, number: int, steps: int, worst_only: bool) -> path_points.Point:
-        """Advance by step `number`, from 1, break overloaded bonds, and return the point.  Collective.
+        """Advance to the end of step `number` (from 1), break overloaded bonds, and return the point.  Collective.
 
         With `worst_only`, only the worst bonds break between two solves.  If the cell carries only a part of the step,
         the point is at this part, and `limit` is set.
@@ -109,7 +109,7 @@ class Leg(ABC):
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self, is_due: bool = False) -> Iterator[path_points.Point]:
-        """Yield a point and break the worst bonds until none is overloaded, at least once if `is_due`.  Collective."""
+        """Yield a point and break the worst bonds, until none is overloaded; at least once if `is_due`.  Collective."""
         while is_due or self._is_overloaded():
             broke, softened, broken = self._release(self._used()[2])
             yield self._point(broke, softened, broken)
@@ -121,7 +121,7 @@ class Leg(ABC):
         return path_points.break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: path_points.PathState) -> path_points.Point:
-        """Return the point at s, for numbers of bonds that part and soften; the energy sum starts anew.  Collective."""
+        """Return the point at s, with the numbers of bonds that part and soften; reset the energy sum.  Collective."""
         energies, self._energies = self._energies, path_points.NO_ENERGIES
         self._reported = self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)

@@ -28,7 +28,7 @@ PARTS = 32
 
 @dataclass(frozen=True)
 class Onset:
-    """The first break in one bond state, where debonded faces do not touch.
+    """The conditions for the first break in a bond state in which debonded faces do not touch.
 
     Attributes:
         bonds: bond law at this rank's nodes in the bond state.
@@ -40,7 +40,7 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Take the law and the bonded nodes in a bond state.  Collective; raises like `BondLaw.in_state`."""
+        """Make the law in a bond state, and mark bonded nodes.  Collective; raises like `BondLaw.in_state`."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
@@ -48,10 +48,10 @@ class Onset:
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
-        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf if none does.
+        """Return the load factors f >= 0 (n, k) that break the bonds under n traction rays; inf without a break.
 
-        Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations
-        under `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after others may have inf.
+        Tractions are f `direction` (n, k, c), plus `before` (k, c) if given, which breaks no bond.  Utilisations under
+        `direction` up to `noise`, (n,) or (n, k), count as zero.  Bonds that break after the first may have inf.
         """
         n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))

@@ -1,11 +1,11 @@
 """Load-induced debonding, Section III.F: the load follows a path, and overloaded bonds break.
 
 `events` finds every break exactly.  On the first leg from zero, without initial gaps, the response is homogeneous of
-degree one: one solve gives the load of the next break, which may be lower than the last load (snap-back).  Later legs
-control the load, see `leg`.  `increments` is the paper's loop.
+degree one: one solve gives the load of the next break, which may be lower than the previous load (snap-back).  Later
+legs control the load, see `leg`.  `increments` is the paper's loop.
 
 Energy.  A break happens at constant load: stresses or strains jump, and work minus the change of stored energy is
-released.  Between breaks, only friction loses energy.  The `energies` of a point count from the last point.
+released.  Between breaks, only friction loses energy.  The `energies` of a point count from the previous point.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,9 +27,9 @@ def events(
 ) -> Iterator[Point]:
     """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with the strains or stresses of the previous state, as its waypoint prescribes.  The state of a point
-    precedes its break.  On later legs, and with friction on all legs, contact changes are points too, with `broke` = 0;
-    the response is straight up to a point, from the state behind the last break.  A point without convergence is the
+    A leg begins with the strains or stresses of the previous state, as the leg's waypoint prescribes.  The state of a
+    point precedes its break.  On later legs, and with friction on all legs, contact changes are points, too (`broke` =
+    0); the response is straight up to a point, from the state after the last break.  A point without convergence is the
     last one.  Raises NotCarriedError if the cell carries no more load; the last point is at the largest load.
     """
     for leg in range(begin.leg, len(waypoints)):

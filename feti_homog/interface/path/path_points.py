@@ -40,7 +40,7 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies between the last point and the state `after`; only a break loses energy."""
+        """Return the energies from the last point to the state `after`; only a break at the last point loses any."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
         return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
@@ -71,7 +71,7 @@ class Point:
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before this state.
         softened: number of bonds that lose teeth but hold.
-        energies: energies since the last point.
+        energies: energies since the previous point.
         used: (k,) utilisation before bonds break, 0 without a bond; empty in a point from a checkpoint.
         after: state from which the path continues.
     """
@@ -97,7 +97,7 @@ def break_bonds(
 ) -> tuple[int, int, PathState]:
     """Break the bonds in the mask `which` (k,) of an equilibrium, regardless of the tractions.  Collective.
 
-    Return the numbers of bonds that part and that soften, over all ranks, and the path state `place` after the break.
+    Return the numbers of bonds that part and that soften, over all ranks, and `place` with the bonds after the break.
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)

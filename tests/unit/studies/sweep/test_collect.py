@@ -52,9 +52,8 @@ def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
     assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, 4.0, -7.0]
     assert found["peak_E11"] == pytest.approx(0.02)  # whose stress falls behind it
     assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
-    assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
+    assert (found["onset_E11"], found["end_E11"], found["friction_heat"]) == pytest.approx((0.02, 0.2, 0.7))
     assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
-    assert found["friction_heat"] == 0.7 and "friction_heat" not in outputs(path_document(2, 0.0))
     path["path"] = [point | {"broke": 0} for point in path["path"]]
     assert {*found} - {*outputs(path)} == {name for name in found if name.startswith("onset_")}
     path["path"][1]["softened"] = 1
