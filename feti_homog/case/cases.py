@@ -17,7 +17,7 @@ from feti_homog.case.material_sections import provider, read_materials, unlike_u
 from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES, Rule
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
-from feti_homog.case.toml_files import leaves, read_document, short_digest, to_document, with_values
+from feti_homog.case.toml_files import is_key, leaves, read_document, short_digest, to_document, with_values
 from feti_homog.errors import CaseError
 from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.schema import TableReader, keys, types, wording
@@ -92,7 +92,7 @@ class Case:
         both symmetric entries; None removes a key.  Raises like `parse`.
         """
         (document, folder), faults = self.source, list[str]()
-        changed = with_values(document, dict(leaves(to_document(changes))), faults)
+        changed = with_values(document, dict(leaves(to_document(changes), is_key)), faults)
         if faults:
             raise CaseError(*faults)
         return parse(changed, folder)

@@ -28,11 +28,13 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
     `sections` are the fields of `Case`, None if faulty or absent; `plane` is None if no plane state is valid.
     """
     path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
-    faults, heated = list[str](), []
+    kind, section = ("path", path) if load is None else ("load", load)
+    placed = {} if section is None else section.placed
+    warm = [place for place, target in placed.items() if load_sections.TEMPERATURE in load_sections.named(target)]
+    faults, heated = list[str](), [f"[{kind}] {place}.{load_sections.TEMPERATURE}" for place in warm]
     if load is not None and not any(load.to.named.values()):
         faults.append(f"[load] to = {wording.toml_value(load.to.named)}: expected a load other than zero")
     elif path is not None:
-        placed = path.placed
         if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
             loads = load_sections.completed(tuple(placed.values()), plane)
             repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
@@ -45,13 +47,6 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
                     faults.append(f"{given}: expected a {noun} other than {former}")
         if path.increments is not None and path.increments < len(placed):
             faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
-    for kind, section in (("load", load), ("path", path)):
-        placed = {} if section is None else section.placed
-        heated += [
-            f"[{kind}] {place}.{load_sections.TEMPERATURE}"
-            for place, target in placed.items()
-            if load_sections.TEMPERATURE in load_sections.named(target)
-        ]
     if envelope is not None and envelope.temperature is not None:
         heated.append(f"[envelope] {load_sections.TEMPERATURE}")
     if heated:
@@ -168,8 +163,7 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
     if law.softens:
         needed = [name for name in law.needs if name not in COHESIVE[2:] and getattr(interface, name) is None]
         line = f"law = {wording.toml_value(law.name)} needs a finite one"
-        faults = [f"{name}: {line}" for name in needed if name in table]
-        faults += _branch_faults(interface)
+        faults = [*(f"{name}: {line}" for name in needed if name in table), *_branch_faults(interface)]
         yield from faults
         for kind in () if faults or needed else ("normal", "tangential"):
             names = (f"{kind}_{name}" for name in ("stiffness", "strength", "toughness"))

@@ -29,9 +29,9 @@ STD = types.real(above=0.0)
 
 AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
 AXIS_MEANING = (
-    "Values of any key of the file; its section may also give the key. A section may get a list of tables, each of "
-    'which is merged into it: cell = [{geometry = "square"}, {geometry = "random", fibres = 30}]; further keys of that '
-    'section are then quoted: "cell.refine" = [0, 1].'
+    "Values of any key of the file, which replace its value in the section. A section may get a list of tables, each "
+    'of which is merged into it: cell = [{geometry = "square"}, {geometry = "random", fibres = 30}]; further keys of '
+    'that section are then quoted: "cell.refine" = [0, 1].'
 )
 
 RANGE_KEYS = {

@@ -120,6 +120,11 @@ def leaves(
             yield path, value
 
 
+def is_key(path: TomlPath, table: object = None) -> bool:
+    """Return whether a path names a key, such as `load.to`, and not a section; the `table` there does not matter."""
+    return path[:-1] not in ((), ("material",), ("interface",))
+
+
 def in_lists(path: TomlPath) -> TomlPath:
     """Replace the name "Cij" at the end of a stiffness path by row "i" and column "j"; return other paths unchanged."""
     entry = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == ("stiffness",) else None
@@ -131,9 +136,9 @@ def with_values(
 ) -> dict[str, Any]:
     """Return a copy of a document with other values at some paths.
 
-    A table is merged into its section, None removes a key, a missing section is created.  A number, from 1, selects one
-    of several sections or an entry of a list; "Cij" sets C_ij and C_ji of a stiffness.  At the first fault, a line that
-    begins with `place` is appended to `faults`, and the copy is returned without the later values.
+    A table is merged into a section, but replaces the table of a key.  None removes a key, a missing section is
+    created.  A number, from 1, selects one of several sections or an entry of a list; "Cij" sets C_ij and C_ji of a
+    stiffness.  The first fault appends a line that begins with `place` to `faults`, and leaves out the later values.
     """
     document = copy.deepcopy(dict(base))
     for path, value in values.items():
@@ -159,7 +164,7 @@ def with_values(
                         continue
                 faults.append(f"{place}{wording.dotted_key(path)}: {several}")
                 return document
-            is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
+            is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict) and not is_key(path)
             table[last] = table.get(last, {}) | value if is_merged else value
             if value is None:
                 del table[last]

@@ -111,7 +111,8 @@ class FitReader:
                 elif (datum := self._read(sections.Measured, value, place, name, "{value, std}")) is not None:
                     data.append(Datum(number, name, datum.value, datum.std))
                     self._check_std(datum.std, datum.value, f"[{place}] {name}.std")
-            changes = dict(toml_files.leaves({name: value for name, value in row.items() if name != sections.MEASURED}))
+            of_case = {name: value for name, value in row.items() if name != sections.MEASURED}
+            changes = dict(toml_files.leaves(of_case, toml_files.is_key))
             assignments.append(changes)
             for path in changes.keys() & unknowns:
                 name = f"[[{sections.TEST}]] {number + 1}, {wording.dotted_key(path)}"

@@ -90,6 +90,13 @@ def test_tests_are_changes_of_one_case(tmp_path):
     assert [fit.rows_of(test) for test in (0, 1)] == [slice(0, 1), slice(1, 2)]
 
 
+def test_the_load_of_a_test_replaces_the_load_of_the_case():
+    case = f"{BASE.replace('stiffness', 'path')}{PATH.replace('strain = [0.1, 0.0, 0.0]', 'to = {S11 = 1.0}')}"
+    test = "[[test]]\npath.to = {S22 = 2.0}\n[test.measured]\npeak_S22 = {value = 1.0, std = 0.1}\n"
+    (load,) = parse(tomllib.loads(case + UNKNOWN + test), Path()).at([77.0]).cases[0].targets
+    assert {name: value for name, value in load.items() if value} == {"S22": 2.0}
+
+
 @pytest.mark.parametrize(
     ("load", "table", "line"),
     [

@@ -37,6 +37,14 @@ def test_values_arrive_in_the_cases():
     assert len({entry.identity for entry in sweep.entries}) == 2
 
 
+def test_a_table_replaces_the_value_of_a_key_but_is_merged_into_a_section():
+    case = f"{CASE}[load]\nto = {{S11 = 1.0}}\n".replace('"stiffness"', '"load"')
+    found = expanded("load.to = [{S22 = 2.0}, {S12 = 3.0}]\ncell = [{fibre_fraction = 0.2}]\n", case).cases
+    assert [one.single_load.to.named for one in found] == [{"S22": 2.0}, {"S12": 3.0}]
+    assert [(one.cell.geometry, one.cell.fibre_fraction) for one in found] == [("hexagonal", 0.2)] * 2
+    assert found[0].replace({"load.to": {"E22": 1.0}}).single_load.to.named == {"E22": 1.0}
+
+
 def test_loads_by_name_are_varied_as_any_keys():
     case = CASE.replace('"stiffness"', '"load"')
     table = "load.to.S11 = {from = 10, to = 30, step = 10}\n'load.to.E22' = [0.0, 0.1]\n"
