@@ -30,8 +30,15 @@ COATED = (
     {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.1, "fibres": 10, "coating": 0.05},
     {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.05, "fibres": 30, "coating": 0.1},
 )
-REFINEMENTS, OF_COATED, OF_ONE_FACTOR = (0, 1, 2, 3), (0, 1, 2), (2, 3)
+MANY_FIBRES = (
+    {"geometry": "random", "fibre_fraction": 0.45, "mesh_size": 0.05, "fibres": 100},
+    {"geometry": "random", "fibre_fraction": 0.45, "mesh_size": 0.03, "fibres": 300},
+)
+REFINEMENTS, OF_COATED, OF_ONE_FACTOR, OF_MANY = (0, 1, 2, 3), (0, 1, 2), (2, 3), (0, 1, 2)
 BODIES = {"cut": "bodies"}
+DEBONDED = {"debonded": [{"fibre": [1], "centre": 0.0, "angle": 60.0}]}
+ON_SPRINGS = DEBONDED | {"normal_stiffness": 1e3, "tangential_stiffness": 1e3}
+GLASS = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.22}}
 UNDAMAGED = {"debonded": [{"fibre": "all"}], "contact": False}
 KEPT = {"analysis": {"type": "angle", "plane": "strain"}, "interface": UNDAMAGED, "angle": {"values": [0.0]}}
 WITH_FIELDS = {"pictures": False}
@@ -42,20 +49,27 @@ def main() -> None:
     """Run the cases, with fields, each in a separate process, and fit."""
     runs = [document(cell, refine) for cell in CELLS for refine in REFINEMENTS]
     coated = [document(cell, refine) for cell in COATED for refine in OF_COATED]
-    for names, (constants, ratios) in (memory_fit(runs, coated) | interior_fit(runs) | factor_fit()).items():
+    bonds = [{"interface": bond, "material": GLASS} for bond in (DEBONDED, ON_SPRINGS)]
+    many = [document(cell, refine, {}, bond) for cell in MANY_FIBRES for refine in OF_MANY for bond in bonds]
+    fits = memory_fit([*runs, *many], coated) | interior_fit(runs) | factor_fit()
+    for names, (constants, ratios) in fits.items():
         for name, value in zip(names.split(", "), constants, strict=True):
             print(f"{name} = {value:.1e}")
         print(f"    estimates are {ratios.min():.2f} to {ratios.max():.2f} times the measurements")
 
 
 def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
-    """Fit the memory of all runs by twice the mesh nodes, and of coated cells by their influence columns.
+    """Fit the memory of all runs by twice the mesh nodes, subdomains, springs and, in coated cells, influence columns.
 
     Returns, by the names of the constants in `partition_policy`, values and estimates / measurements.
     """
-    memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in [*runs, *coated]]).T
+    every = [*runs, *coated]
+    memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in every]).T
+    subdomains = np.array([run["solver"]["subdomains"] for run in every])
+    on_springs = subdomains * ["normal_stiffness" in (run["case"].get("interface") or {}) for run in every]
     columns = np.array([*(0 for _ in runs), *(run["solver"]["multipliers"] for run in coated)])
-    return {"BASE_BYTES, DOF_BYTES, COLUMN_BYTES": fitted(memory, np.ones(len(memory)), dofs, columns)}
+    names = "BASE_BYTES, DOF_BYTES, SUBDOMAIN_BYTES, SPRING_BYTES, COLUMN_BYTES"
+    return {names: fitted(memory, np.ones(len(memory)), dofs, subdomains, on_springs, columns)}
 
 
 def interior_fit(runs: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
@@ -75,7 +89,7 @@ def factor_fit() -> dict[str, tuple[Any, Any]]:
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T
     from feti_homog.homogenization import partition_policy  # starts MPI, after which no run can be started
 
-    others = partition_policy.BASE_BYTES + partition_policy.DOF_BYTES * dofs
+    others = partition_policy.BASE_BYTES + partition_policy.SUBDOMAIN_BYTES + partition_policy.DOF_BYTES * dofs
     constant = np.median((memory - others) / dofs)
     return {"FACTOR_BYTES": ([constant], (others + constant * dofs) / memory)}
 

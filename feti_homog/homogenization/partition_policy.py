@@ -28,13 +28,12 @@ MOST_POISSON = 0.45
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
-# Bytes of a rank without degrees of freedom, per degree of freedom, and per multiplier with stored influence columns;
-# additional bytes per degree of freedom if the run keeps the factors of interiors.
-BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.7e8, 1.0e3, 2.9e4
-INTERIOR_BYTES = 5.1e2
-# Additional bytes for each displacement of the largest problem in a cell of one factor.  For seven bonded cells of
-# 31 000 to 271 000 degrees of freedom, estimates are 0.92 to 1.06 times the measured memory.
-FACTOR_BYTES = 9.4e2
+# Bytes of a rank: without degrees of freedom, per degree of freedom, per subdomain, more on springs, and per multiplier
+# with influence columns.  For 37 cells, estimates are 0.78 to 1.27 times the measured memory.
+BASE_BYTES, DOF_BYTES, SUBDOMAIN_BYTES, SPRING_BYTES, COLUMN_BYTES = 1.5e8, 9.9e2, 7.0e5, 7.7e5, 2.6e4
+INTERIOR_BYTES = 4.7e2  # more per degree of freedom if the run keeps the factors of interiors
+# More per displacement of the largest problem in a cell of one factor; for seven cells, estimates are within 3 %.
+FACTOR_BYTES = 1.2e3
 # Additional bytes of a path to complete debonding: for each multiplier of a rank, and for each pair of a multiplier and
 # an influence column; a cell that is factored anew has `INFLUENCE_COLUMNS` columns.  For five paths with 1 to 50 fibres
 # and 120 to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.  The six dense
@@ -184,7 +183,9 @@ def memory(
     dofs = sum(components) * max(nodes)
     of_interiors = dofs * INTERIOR_BYTES if keeps_interiors(case) else 0.0
     factors = max(components) * max(nodes) * FACTOR_BYTES if max(subdomains) == 1 else of_interiors
-    return BASE_BYTES + dofs * DOF_BYTES + factors + columns / len(nodes) * COLUMN_BYTES
+    springs = SPRING_BYTES if phase_laws.has_springs(case) else 0.0
+    matrices = max(subdomains) * (SUBDOMAIN_BYTES + springs) + columns / len(nodes) * COLUMN_BYTES
+    return BASE_BYTES + dofs * DOF_BYTES + factors + matrices
 
 
 def memory_to_the_end(case: Case, before: float, multipliers: int, columns: int, ranks: int) -> float:

@@ -24,7 +24,7 @@ LINES = {
     "commands": 560 + 10 + 31,
     "fem": 1150 + 3 - 12,
     "feti": 6300 + 8 + 60,
-    "homogenization": 3230 + 57 + 29,
+    "homogenization": 3230 + 58 + 29,
     "interface": 4000 + 24 - 24,
     "materials": 1430 + 58 + 122,
     "mesh": 5500 + 46 + 277,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 75,
 }
-FILES, TOTAL = 310, 45000 + 798 + 1132
+FILES, TOTAL = 310, 45000 + 799 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

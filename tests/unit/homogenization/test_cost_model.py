@@ -38,7 +38,11 @@ def test_more_unknowns_problems_and_columns_take_more_memory():
     assert memory(dofs=(200_000,)) > base > memory(dofs=(50_000, 50_000), subdomains=(5, 4))
     assert base < memory(components=(2, 1)) < 2 * base
     assert memory(columns=10_000) - base == pytest.approx(10_000 * partition_policy.COLUMN_BYTES)
-    assert memory(subdomains=(1,)) - base == pytest.approx(100_000 * partition_policy.FACTOR_BYTES)
+    assert memory(subdomains=(10,)) - base == pytest.approx(partition_policy.SUBDOMAIN_BYTES)
+    springs = replace(make_case(), interfaces=(InterfaceSection(normal_stiffness=10.0, tangential_stiffness=10.0),))
+    assert memory(springs) - base == pytest.approx(9 * partition_policy.SPRING_BYTES)
+    of_a_factor = 100_000 * partition_policy.FACTOR_BYTES - 8 * partition_policy.SUBDOMAIN_BYTES
+    assert memory(subdomains=(1,)) - base == pytest.approx(of_a_factor)
     angles = replace(make_case(), analysis=replace(make_case().analysis, type="angle"))
     assert memory(angles) - base == pytest.approx(100_000 * partition_policy.INTERIOR_BYTES)
 
