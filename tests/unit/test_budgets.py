@@ -19,7 +19,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before.
 LINES = {
     ".": 470 + 18 - 2,
-    "analysis": 3000 + 139 + 75,
+    "analysis": 3000 + 140 + 75,
     "case": 2880 + 36 + 119,
     "commands": 560 + 10 + 31,
     "fem": 1150 + 3 - 12,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 75,
 }
-FILES, TOTAL = 310, 45000 + 799 + 1132
+FILES, TOTAL = 310, 45000 + 800 + 1132
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.4, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
