@@ -151,7 +151,7 @@ class PathPoint:
     stored: float = described("elastic energy stored per area of the cell", records.STRESS)
     stored_in_springs: float = described("part of `stored` in elastic bonds", records.STRESS)
     mesh_error: float | None = described(
-        "estimated relative mesh error of `stored`, at the points that `states` in [output] chooses", default=None
+        "estimated relative mesh error of `stored` at fixed damage, at the points that `states` chooses", default=None
     )
     work: float = described(
         "work of the loads, with a temperature, so far per area of the cell: `stored` + `dissipated`, with friction + "
