@@ -68,7 +68,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             if may_fall and point.load_factor < (1.0 - landmarks.LEAST_FALL) * work.largest_load:
                 way = "the path ends at load factor 1, perhaps much later; with a prescribed strain it ends earlier"
                 context.progress.say(f"  the load falls from its largest value so far, {top}; {way}")
-                context.notes.append(f"[path] if the load only rises, the strain jumps where it first falls here, {top}")
+                context.notes.append(f"[path] under a load that only rises, the strain jumps {top}")
                 may_fall = False
             last = point
             if not point.state.converged:  # the next break would follow from an unconverged state

@@ -33,4 +33,4 @@ def test_a_load_that_falls_from_its_largest_value_has_one_line(to, tmp_path, mon
     (line,) = printed
     place = f"at {top.load_factor:.6f}, E22 {top.strain[1]:.4g}, S22 {top.stress[1]:.4g}"
     assert f"{place}; the path ends at load factor 1" in line and "prescribed strain" in line
-    assert f"[path] if the load only rises, the strain jumps where it first falls here, {place}" in result.remarks
+    assert f"[path] under a load that only rises, the strain jumps {place}" in result.remarks
