@@ -83,7 +83,7 @@ def _verified(directory: Path) -> Certificate:
             laws_of_numbers(findings, cell, states)
             kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
             title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
-            status = "the run reports: " + document.hint("status") + (f"; fault 1 of {len(faults)}: {faults[0]}" if faults else "")
+            status = "run: " + document.hint("status") + (f"; fault 1 of {len(faults)}: {faults[0]}" if faults else "")
             return Certificate(findings.worst(), title, status, unchecked(document))
     except OSError as error:
         raise input_files.unreadable(directory / FIELDS, error) from error
