@@ -255,7 +255,7 @@ class LoadPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
-    """The debonding onset in one direction of a plane of stresses or strains; without one, only `angle` is set."""
+    """The debonding onset in one direction of a plane of stresses or strains; without onset, only `angle` is set."""
 
     angle: float = described("direction of the load in the plane, from the first axis to the second", records.DEGREES)
     factor: float | None = described(

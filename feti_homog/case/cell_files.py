@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "pixels": IMAGE_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
-# Distance outside a cut window / radius up to which a centre counts as a centre on the border.
+# Distance outside a cut window, in radii, up to which a centre counts as a centre on the border.
 LEFT_OUT = 0.01
 
 

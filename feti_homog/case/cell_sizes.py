@@ -117,7 +117,7 @@ def default_size(cell: Cell) -> list[str]:
 
 
 def fibres_and_height(cell: Cell) -> tuple[int, float]:
-    """Return fibre count and height / width of a cell without a user mesh; tables need a size, and all rows count."""
+    """Return fibre count and relative height of a cell without a user mesh; tables need a size, and all rows count."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width

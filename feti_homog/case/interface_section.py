@@ -50,7 +50,7 @@ class Arc:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Scatter of strengths from fibre to fibre: a factor of Weibull's distribution with mean 1 for each fibre."""
+    """Scatter from fibre to fibre: Weibull factors f with mean 1 multiply strengths, and f^2 toughnesses."""
 
     shape: float = key(
         types.real(least=1.0, most=1000.0),

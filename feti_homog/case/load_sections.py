@@ -69,10 +69,10 @@ WAYPOINTS = types.list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Complete the loads of a path: return, for each load, name -> value for every component.
+    """Return the loads of a path, completed: for every component, each dict has the strain or the stress by name.
 
-    In generalized plane strain a load also has the temperature. Components that a load does not name keep the values of
-    the previous load; before the first load, all stresses and the temperature are zero.
+    In generalized plane strain a load also has the temperature. Components that a load does not name keep the strain or
+    stress of the previous load; before the first load, all stresses and the temperature are zero.
     """
     state = voigt.PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, TEMPERATURE) if state.is_spatial else state.stresses, 0.0)

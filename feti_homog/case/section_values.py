@@ -20,7 +20,7 @@ IMAGE_FILE = ".png, .tif, .npy or .npz file"
 
 
 def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueType:
-    """Return the type of tables {fibre phase: number}, which messages call a table of `words`, such as `example`."""
+    """Return the type of nonempty tables {fibre phase: number}; messages call numbers `words` and quote `example`."""
 
     def accepts(value: Any) -> bool:
         is_table = isinstance(value, dict) and value != {}

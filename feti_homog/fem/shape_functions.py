@@ -147,7 +147,7 @@ class MixedElements:
         return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
 
     def stress(self, u: Float) -> Float:
-        """Compute the stresses 2 mu eps + p I (e, q, 3, k), eps the strain, of displacements (e, 7, 2, k)."""
+        """Compute the stresses 2 mu eps + p I (e, q, 3, k) of displacements u (e, 7, 2, k); p = lambda Pi div u."""
         first, shear = self.lame
         stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * strains(slopes(self.gradients, u), PLANE)
         stress[:, :, :2] += first * self.dilatation(u)[:, :, None]

@@ -143,7 +143,7 @@ class ActiveJumps:
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
-        """Complete a solution of the present state: return it with alpha, jumps and residual by F lambda.
+        """Return a solution of the present state, completed by alpha, jumps and residual from F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """

@@ -36,7 +36,7 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: element_estimate.ElementEstimate) -> float | None:
-    """Return the element size at tips / cell width; None if the size on interfaces also holds at tips.
+    """Return the element size at tips, relative to the cell width; None if the size on interfaces also holds at tips.
 
     Without `tip_size` in the case, the size follows from the ratio R of the mean fibre radius to the cell width,
 

@@ -13,12 +13,12 @@ from feti_homog.typing import AnyInt, Float, Int
 
 # Largest relative difference between fibre fractions, stiffness ratios or peak tractions that deserves no remark.
 SAME_RATIO = 0.01
-# Largest element on an interface / length of the process zone. At a ratio of 0.54, the stresses of the square cell in
+# Largest element on an interface, in lengths of the process zone. At 0.54, the stresses of the square cell in
 # tests/parallel/test_energy.py differ by 1.4 % from the stresses with elements a quarter as long; at 1.1, by 4.3 %.
 RESOLVED = 0.5
 # The same ratio for cohesive laws, whose tractions fall along the process zone.
 RESOLVED_SOFTENING = 1 / 3
-LEAST_SIZE = 1e-5  # least default element size at tips, and recommended size on interfaces / cell width
+LEAST_SIZE = 1e-5  # in cell widths: least default element size at tips, and recommended size on interfaces
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:

@@ -32,13 +32,13 @@ from feti_homog.interface.contact import BONDED, ContactProblem, Status
 from feti_homog.system.parallel import distributed_arrays
 from feti_homog.typing import Array, Float, Int, Int32
 
-# Closed length from which the modes are determined / fibre radius; the length has at least one element.
+# Closed length from which the modes are determined, in fibre radii; the length has at least one element.
 MODE_LENGTH = 1e-3
 QUARTER_TURN, AXES = np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([1.0, 1j])
-# REACH: radius of the turning nodes about a tip / distance to boundaries.  REACH_OF_A_PERIOD: largest such radius /
-# cell period.  CORE: radius within which q = 1 / radius of the turning or growing nodes.
+# REACH: radius of the turning nodes about a tip, relative to the distance to boundaries.  REACH_OF_A_PERIOD: largest
+# such radius, in cell periods.  CORE: radius within which q = 1, relative to the radius of turning or growing nodes.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
-# Radius of the zone about a tip where the mesh grows / element length; 4 and 16 give nearly the same mesh errors.
+# Radius of the zone about a tip where the mesh grows, in element lengths; 4 and 16 give nearly the same mesh errors.
 SINGULAR = 8
 # Relative distance from a circle beyond which a node of its two bodies lies on another boundary or periodic image.
 OFF_CIRCLE = 1e-4

@@ -11,8 +11,8 @@ from feti_homog.mesh.submeshes import Submesh, cut_bodies
 from feti_homog.microstructure import phase_names
 from feti_homog.typing import Bool, Float, Int
 
-# Limits / longer semi-axis: distance between the centres of nested curves, and difference between the thicknesses of a
-# coating along both semi-axes.
+# Limits, relative to the longer semi-axis: distance between the centres of nested curves, and difference between the
+# thicknesses of a coating along both semi-axes.
 SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
 
 

@@ -20,7 +20,7 @@ from feti_homog.mesh.coarse_mesh import HALVES, edge_keys, edges, twins
 from feti_homog.mesh.submeshes import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Largest offset of a cut from the middle / number of triangles in the part.
+# Largest offset of a cut from the middle, as a fraction of the triangles in the part.
 OFF_THE_MIDDLE = 0.1
 # Fewest intervals per side for which dissection also orders the inner nodes of a coarse triangle.
 MANY_INTERVALS = 8

@@ -12,7 +12,7 @@ from feti_homog.typing import Float
 LEAST_GAP, MOST_GAP = 0.01, 0.05
 # Overlap / radius sum that counts as no overlap; required distances are larger by this fraction.
 TOLERANCE = 1e-6
-# Change of the moves in one step / mean radius, below which the moves are final.
+# Change of the moves in one step, in mean radii, below which the moves are final.
 SETTLED = 1e-4
 MAX_STEPS = 100
 

@@ -8,7 +8,7 @@ from feti_homog.microstructure.shapes import directions
 from feti_homog.typing import Bool, Float, Int
 
 SMALLEST = 3.0  # radius in pixels
-# For each fit: largest distance of an edge from its circle / radius, and least `_excess` of edges on a circle.
+# For each fit: largest distance of an edge from its circle, in radii, and least `_excess` of edges on a circle.
 FITS = (0.2, 0.5), (0.1, 1.0), (0.05, 2.2)
 RIM = directions(np.linspace(0.0, 2 * np.pi, 65))
 

@@ -193,7 +193,7 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
 def _create(part: Path, size: int) -> None:
     """Create the HDF5 file `part` without content, and reserve `size` bytes for it.
 
-    It makes system calls without HDF5, which may crash or hang if they fail.  Raises OSError; the file is then removed.
+    HDF5 may crash or hang if a write fails: plain system calls write here.  Raises OSError; then the file is removed.
     """
     part.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -1,4 +1,4 @@
-"""Find the computed values for a fit or a study of scatter in result.json, and derivatives by the unknowns."""
+"""Check measured values against a case; find computed values and their exact derivatives in result.json."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -133,9 +133,9 @@ Pairs = Sequence[tuple[StateNumbers, tuple[Prescribed, Document]]]
 
 
 def check_loads(findings: Findings, cell: DiscreteCell, states: States, rows: Rows) -> Pairs:
-    """Check the loads of points and states against the case.  Returns states with their rows.
+    """Check the loads of points and states against the case; return each state with its row.
 
-    A path keeps `[output] states` states; result.json lists their points, which include the first and the last.
+    A row is a load with its entries in result.json.  The states of a path include its first and last points.
     """
     document, numbers, count = cell.files.document, [state.point for state in states], len(rows)
     # The bonded cell gives the scale of stresses: computed strains are no scale for prescribed stresses.
@@ -175,7 +175,7 @@ def _check_load(findings: Findings, load: Prescribed, numbers: Document, scales:
 
 
 def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: Pairs) -> None:
-    """Check points, or columns of a stiffness, in result.json against the states."""
+    """Check points, or columns of a stiffness, in result.json against states and their rows `pairs`."""
     files, nodes, sections = cell.files, cell.files.interface, len(cell.files.interfaces)
     is_same = json.loads(str(files.file.attrs["case"])) == files.case
     findings.require("tables", is_same, "the case, which differs between the two files")

@@ -27,7 +27,7 @@ LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
 WITHOUT_BUBBLE = 1.7
 # Least ratio of an energy error to the sum of the element errors, which may cancel at arcs.
 LEAST_SHARE = 0.05
-MODE_LENGTH = 1e-3  # least length at which modes are evaluated / radius
+MODE_LENGTH = 1e-3  # least length at which modes are evaluated, in radii
 # Middles of sides in barycentric coordinates: a quadrature rule, exact for squares of linear functions.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 

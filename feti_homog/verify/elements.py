@@ -66,7 +66,7 @@ class Elements:
 
     @cached_property
     def least_jacobian(self) -> Float:
-        """Compute the least determinant at the quadrature points / |mean determinant| (m,)."""
+        """Compute the least quadrature weight of an element over its |mean weight| (m,), positive in valid elements."""
         parts = [weights / np.abs(weights.mean(axis=1))[:, None] for _, _, weights in self._parts()]
         return np.concatenate([part.min(axis=1) for part in parts])
 

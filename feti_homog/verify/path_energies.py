@@ -153,7 +153,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
     load_strains, load_forces = load.values[~load.by_stress], load.values[load.by_stress]
-    # The stored energy of a cell without bonds is rounding.
+    # Where bonds alone carried the load, the stored energy after their break is rounding.
     energy = other.stored if abs(other.stored) > ROUNDING * other.terms else 0.0
     least = _largest(_work(load_strains, stresses), energy, load_forces, forces)
     return least, -_largest(_work(load_forces, answers), energy, load_strains, strains)

@@ -58,7 +58,7 @@ class InterfaceRows:
 class Fibres:
     """The f fibres: bodies (f,), centres (f, 2) and radii (f,), NaN where undefined.
 
-    `strength` (f,) is the strength of bonds / the strength in the case.
+    `strength` (f,) is the bond strength, relative to the strength in the case.
     """
 
     body: AnyInt
@@ -89,7 +89,7 @@ class State:
         status: (k,) values of `Status`.
         damage: (k,) from 0 (intact) to 1 (broken).
         sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
-        mesh_error: (m,) estimated energy error of an element / energy of the cell, NaN without an estimate.
+        mesh_error: (m,) estimated energy error, relative to the energy of the cell; NaN without an estimate.
     """
 
     name: str

@@ -39,7 +39,7 @@ class Cohesive(QuadraticStrength):
         return np.asarray(super().jumps(traction) / shares)
 
     def utilisation(self, traction: Float) -> Float:
-        """Compute the utilisation (k,): opening delta / delta at the next tooth."""
+        """Compute the utilisation (k,): the opening delta over its value at the next tooth."""
         level = np.abs(np.subtract.outer(np.broadcast_to(self.damage, len(traction)), self.levels)).argmin(axis=1)
         level = np.minimum(level, len(self.levels) - 2)
         low, high = self.levels[level], self.levels[level + 1]

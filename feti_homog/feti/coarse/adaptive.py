@@ -177,7 +177,7 @@ class AdaptiveCoarseSpace:
 class Balanced(Preconditioner):
     """The preconditioner H_0 = B_D S_0 B_D^T, with S_0 of `coarse` and B_D of `scaled`.
 
-    For rigid-body motions R and G = B R, S_0 B_D^T B R = S_0 R = 0, so that G^T H_0 r = 0 and H_0 G = 0.
+    For rigid-body motions R and G = B R, R - B_D^T G is in Z_0; S_0 R = S_0 Z_0 = 0, so G^T H_0 r = 0 and H_0 G = 0.
 
     Attributes:
         scaled: the preconditioner without coarse space.

@@ -218,9 +218,9 @@ class FollowedResponse:
         return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
-        """Begin a change: return columns (owned rows, k) of Gamma at `rows`, and rows of [columns, U].  Collective.
+        """Begin a change; return the columns (owned rows, k) of Gamma at `rows`, which count as used.  Collective.
 
-        The second array (k + all columns, k + v), equal on all ranks, has rows `rows`, then all rows with a column.
+        Also returns, on all ranks, rows (k + s, k + v) of [columns, U]: `rows`, then the s rows with stored columns.
         """
         self._now += 1
         self._used[self._slot[rows]] = self._now

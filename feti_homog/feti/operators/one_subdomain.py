@@ -27,7 +27,7 @@ class ExplicitInterfaceOperator:
     With fixing nodes on the boundary, the inverse of S + rho Rf Rf^T (`Subdomain.fixing`) is the boundary part of K+.
 
     Attributes:
-        condensed: unit loads on the boundary.
+        condensed: unit loads, condensed to the boundary.
         factor: factor of the whole subdomain for displacements inside; None if not kept.
     """
 

@@ -109,7 +109,7 @@ class _Fibres:
 
 @dataclass(frozen=True)
 class FloatingBodies:
-    """Free fibres that may move between this rank's nodes `is_open` (k,); gaps up to `noise` may be solver errors."""
+    """Free fibres, confined by faces at this rank's open nodes `is_open` (k,); overlaps up to `noise` may be errors."""
 
     comm: MPI.Intracomm
     coarse: natural.NaturalCoarseSpace

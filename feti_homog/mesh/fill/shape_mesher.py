@@ -28,9 +28,9 @@ from feti_homog.typing import Float
 SAME_PLACE = 1e-6
 # Fewest and most grid cells along a side, for the grid of sizes that gmsh reads.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
-# Edge length on a coating / thickness; cosine between outline and side normals, above which they face each other.
+# Edge length on a coating, in thicknesses; cosine between outline and side normals, above which they face each other.
 COATING_EDGE, FACING = 2.0, 0.9
-# Smallest edge size / size of the cell.
+# Smallest edge size, relative to the longer side of the cell.
 LEAST = 1e-5
 
 
@@ -146,7 +146,7 @@ def _add_shape(gmsh: ModuleType, shapes: convex_sums.ConvexSums, number: int) ->
 
 
 def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
-    """Return the size field h = min_k (h_k + g |x - x_k|) over points x_k on all outlines, g = MAX_GROWTH.
+    """Return the size field min(`sizes.largest`, min_k (h_k + g |x - x_k|)), g = MAX_GROWTH, x_k on all outlines.
 
     h_k is at most the interface size, 2 pi R / MIN_EDGES_AROUND with the radius of curvature R at rounded corners and
     on ellipses, COATING_EDGE times the coating thickness, and PASSAGE_EDGE times the distance to the next outline, or

@@ -13,7 +13,7 @@ from feti_homog.microstructure import Arrangement, arrangements
 from feti_homog.microstructure.shapes import Ellipses, convex_sums, directions, gaps
 from feti_homog.typing import Float, Int
 
-# Longest edge on a coating / thickness.
+# Longest edge on a coating, in thicknesses.
 LONGEST = 10.0
 
 

@@ -20,12 +20,12 @@ NEAREST = 16  # sources that count at a position
 CHUNK = 100_000
 # Smallest number of edges around a fibre.
 MIN_EDGES_AROUND = 16
-# Edge length in a narrow passage / width of the passage.
+# Edge length in a narrow passage, in widths of the passage.
 PASSAGE_EDGE = 1.5
-# Angle between a circle and a crossing side / turn of the circle along an edge at the crossing.
+# Ratio of the angle between a circle and a crossing side to the turn of the circle along an edge at the crossing.
 WEDGE = 3
-# Edge size on a circle / largest size, below which elements grow from the circle: gmsh would interpolate sizes between
-# tiny discs that are far apart.
+# Edge size on a circle, relative to the largest, below which elements grow from the circle: gmsh would interpolate
+# sizes between tiny discs that are far apart.
 FINE_CIRCLE = 0.1
 # Outward normals of the sides of a cell.
 AXES = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
@@ -84,7 +84,7 @@ def at_vertices(vertices: Float, size: Float) -> Source:
 
 @dataclass(frozen=True)
 class MeshSizes:
-    """The largest edge lengths / cell width: anywhere (`largest`), on circles (`interface`), at debond tips (`tip`)."""
+    """Largest edge lengths over the cell width: anywhere (`largest`), on circles (`interface`), at tips (`tip`)."""
 
     largest: float
     interface: float

@@ -110,7 +110,7 @@ def curve_at(curves: Conics, points: Float) -> Int:
 
 
 def on_curves(curves: Conics, points: Float) -> tuple[Int, Float]:
-    """Find the points that lie on curves: return, pair by pair, the curves (c,) and the points (c, 2)."""
+    """Find all c pairs of a curve and a point on it; return the curve numbers (c,) and points (c, 2)."""
     close = cKDTree(points).query_ball_point(curves.centres, curves.longest * (1 + SAME_PLACE))
     number = np.repeat(np.arange(len(curves)), [len(candidates) for candidates in close])
     points = points[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]

@@ -26,7 +26,7 @@ MIN_ELLIPSE_EDGES = MIN_CIRCLE_EDGES + 2
 # Rise / length of a circle edge as long as the radius, which spans 60 degrees.  With larger ratios, elements beside the
 # tips of thin ellipses could turn over.
 MOST_BENT = 1 - np.sqrt(3) / 2
-# Distance of a middle node from the chord / chord length, up to which an edge is straight.
+# Distance of a middle node from the chord, in chord lengths, up to which an edge is straight.
 STRAIGHT = 1e-5
 
 

@@ -21,7 +21,7 @@ from feti_homog.microstructure import arrangements
 from feti_homog.microstructure.shapes import on_circle
 from feti_homog.typing import Float, Int
 
-# Least distance of bridges from third discs / disc radius, and of bridge ends from cell sides / mean radius.
+# Least distance of bridges from third discs, in disc radii, and of bridge ends from cell sides, in mean radii.
 CLEAR = 0.3
 # Least angle between two bridges on one disc.
 LEAST_ANGLE = np.radians(25)
@@ -36,7 +36,7 @@ class CentreLines:
         angle: (e,) direction from the first to the second disc, in radians.
         gap: (e,) distance between the circles.
         facing: (e, 2, 2) the point on each circle that faces the other circle.
-        clearance: (e,) least distance between the line and the centre of a third disc / radius of that disc.
+        clearance: (e,) least distance between the line and the centre of a third disc, in radii of that disc.
     """
 
     ends: Int

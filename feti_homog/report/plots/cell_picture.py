@@ -31,7 +31,7 @@ LEAST_SIZE = 3.0  # points; smallest font size
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # style of the contour lines of u_3
 UNDEFORMED = "0.5"
 CUT = "#B00000"  # colour of cuts within bodies, and of debonded arcs
-FLAT = 0.02  # standard deviation in each phase / largest stress, below which colours show nothing
+FLAT = 0.02  # standard deviation in each phase, relative to the largest stress, below which colours show nothing
 
 
 def figure(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:

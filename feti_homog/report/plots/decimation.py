@@ -16,7 +16,7 @@ from feti_homog.typing import Array
 
 LEAST_AREA = 0.5  # deformed / undeformed triangle area: a triangle turns over at zero
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
-SAME_PLACE = 1e-6  # largest distance of coincident nodes / size of the cell
+SAME_PLACE = 1e-6  # largest distance of coincident nodes, in sizes of the cell
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # the quarters of a six-node triangle
 
 
