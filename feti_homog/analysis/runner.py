@@ -48,7 +48,7 @@ def run(
         from feti_homog.analysis import stored_result  # loads readers that most runs do not use
 
         if mpi_errors.on_root(comm, stored_result.finished, directory, case, comm.size):
-            progress.say(f"{directory} holds the finished result of this case: nothing to do")
+            progress.say(f"{directory} holds the finished result of this case: nothing to do; `plot` draws pictures")
             return Result.of(mpi_errors.on_root(comm, result_json.read, directory))
     mpi_errors.on_root(comm, output_folder.usable, directory)
     mpi_errors.on_root(comm, output_folder.refuse_files_of_others, directory)

@@ -32,7 +32,7 @@ def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_perce
     heading, band = axes.texts
     assert (heading.get_text(), band.get_text()) == ("measured / computed", "grey: 95 %")
     figure = pictures.fit_figure({"name": "fit", "measured": ROWS, "unknowns": {"a": {"estimate": 2.0, "std": 0.25}}})
-    assert figure.get_suptitle() == "fit: computed and measured\na = 2 ± 0.25"
+    assert figure.get_suptitle() == "fit: computed and measured\na = 2 ± 0.25 (std)"
     assert heading.get_window_extent().x1 < axes.get_window_extent().x0 < band.get_window_extent().x0
 
 
@@ -65,7 +65,7 @@ def test_curves_of_results_are_whole_with_units():
     rows = [row | {"strain": 0.1 * k, "value": 5.0, "computed": 8.0 / k} for k in (1.0, 2.0)]
     document = {"name": "fit", "measured": rows, "unknowns": {"material.fibre.E_axial": {"estimate": 2.0, "std": 0.25}}}
     figure = pictures.fit_figure(document, [{"case": case, "path": points}])
-    assert figure.get_suptitle() == "fit: computed and measured\nmaterial.fibre.E_axial (MPa) = 2 ± 0.25"
+    assert figure.get_suptitle() == "fit: computed and measured\nmaterial.fibre.E_axial (MPa) = 2 ± 0.25 (std)"
     (axes,) = figure.axes
     assert axes.get_ylabel() == r"stress $\Sigma_{22}$ (MPa)"
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
