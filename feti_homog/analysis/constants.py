@@ -121,8 +121,8 @@ def mesh_error(
     """Compute the `Result` entry `mesh_error`; {} without estimated errors.  Collective.
 
     A constant f(C) of the stiffness C has the error max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|), with the
-    estimated error `signed` of C and its smallest size `least` if parts cancel (`EnergyErrors`).  Notes an energy error
-    above the accuracy of the case, and constants outside their bounds (`_note_bounds`).
+    estimated error `signed` of C, and the size `least` that remains if its parts cancel (`EnergyErrors`).  Notes an
+    energy error above the accuracy of the case, and constants outside their bounds (`_note_bounds`).
 
     Args:
         secants: `effective_stiffness` and the entries that follow from it, as in `Result`.

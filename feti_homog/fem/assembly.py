@@ -31,8 +31,8 @@ class Assembly:
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
-        Q: (dofs, v) int B^T L, where B u* are the strains of fluctuating displacements u*.  A macroscopic strain E
-            has the load -Q E, Eq. (29), and the stress integral |Omega| L E + Q^T u*.
+        Q: (dofs, v) int B^T L, where B u* are the v strains of fluctuating displacements u*.  A macroscopic strain
+            E (v,) has the load -Q E, Eq. (29), and the stress integral (int L) E + Q^T u*.
         slopes: (classes, 2) int dN/dx of the shape functions.
         areas: (materials,) areas of the materials; their sum is |Omega|.
     """

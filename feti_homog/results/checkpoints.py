@@ -247,7 +247,7 @@ def refuse_others(directory: Path) -> None:
 
 
 def remove(directory: Path) -> None:
-    """Remove the checkpoint, renamed before, so that no run finds a part.  On one rank.  Raises FetiHomogError."""
+    """Rename the checkpoint, then delete it as far as possible.  On one rank.  FetiHomogError if the renaming fails."""
     folder, dropped = directory / FOLDER, directory / DROPPED
     _remove_events(dropped)
     if folder.is_dir():

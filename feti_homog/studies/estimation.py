@@ -168,7 +168,7 @@ def summarize(
 
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
-    """Return a message for each undetermined direction; `rows` has the indices in `names` of its unknowns."""
+    """Return a message for each undetermined direction, which is a row with the indices of unknowns in `names`."""
     alone, together = "no measured value depends on it", "the measured values do not determine them together"
     return [f"[unknown] {', '.join(names[k] for k in row)}: {alone if len(row) == 1 else together}" for row in rows]
 

@@ -134,8 +134,8 @@ class SweepTable:
     def curves(self, point: int) -> tuple[Float, Float]:
         """Return the stress-strain curves at a point of the sweep, interpolated to common strains.
 
-        Returns strains (g,), g = CURVE_POINTS, and c stresses (n, g, c) of the n finished realisations with a path of
-        one leg on which the strain rises with the load.  Both are empty if n = 0.
+        Returns leading strains (g,) from 0 to the shortest path's end, g = CURVE_POINTS, and c stresses (n, g, c) of
+        the n finished realisations with a `path_curves.rising_strain`.  Both are empty if n = 0.
         """
         paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:

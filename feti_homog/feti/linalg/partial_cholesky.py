@@ -162,7 +162,7 @@ class PartialFactor:
         return U
 
     def forward(self, B: Float) -> Float:
-        """Compute L^-1 B for B (n, k); rows of the result follow `order`, and end with `rows`."""
+        """Compute L^-1 B for B (n, k), in the order of elimination: the chosen rows of A are last."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")

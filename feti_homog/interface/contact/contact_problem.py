@@ -46,7 +46,7 @@ class ContactProblem:
         solver: dual solver.
         contact: whether faces resist overlap; if not, damaged bonds are still stiff under pressure.
         size: (2,) cell size, a scale of displacements.
-        softening: maps bonds and a mask (k,) of tension to ratios C / C_0 (k, 3) of springs, or None if all are 1.
+        softening: maps bonds and a mask (k,) of tension to compliance ratios (k, 3) by damage, or None if all are 1.
         block_pivots: number of block pivots before single nodes change, counted from the last pivot with progress.
     """
 

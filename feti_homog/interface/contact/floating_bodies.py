@@ -57,8 +57,8 @@ class _Fibres:
     def nodes_and_motions(self, which: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
         """Yield the open nodes and gap-opening motions of each fibre with an open node in `which` (k,).
 
-        The items are the nodes (n,), their gaps M (n, m) under m motions, the numbers (c,) of the free motions that
-        move the nodes, and the combinations (c, m) of free motions in M; m = 0 if no free motion opens a gap.
+        The items are the nodes (n,), their gaps (n, m) under m motions, the numbers (c,) of the free motions that move
+        the nodes, and the m motions as combinations (c, m) of these; m = 0 if no free motion opens a gap.
         """
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & which]))
         nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]

@@ -175,7 +175,7 @@ class BondLaw(ABC):
 
 
 class SpringLaw(BondLaw):
-    """Base class of laws in which bonds break at an energy of undamaged springs that depends on the mode.
+    """Base class of laws in which undamaged springs break at a critical energy, which depends on the mode.
 
     A traction along the fibre adds to the slip energy, because the law treats all directions of shear in the same way.
 

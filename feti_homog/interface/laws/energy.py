@@ -129,7 +129,7 @@ class ReleasedEnergy(SpringEnergy):
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
         """Return the law at this rank's nodes in a bond state.  Collective; methods of the returned law are not.
 
-        Raises ConvergenceError if rounding hides the released energy.
+        Sets the bond state of the solvers.  Raises ConvergenceError if rounding hides the released energy.
         """
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first

@@ -163,7 +163,7 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
 
 
 def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
-    """List the corners of the cell, [0, `size`] from `origin`, where no node of `plane` (n, 2) lies."""
+    """Return a fault on cell corners, of [0, `size`] from `origin`, without a node of `plane` (n, 2); or []."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     bare = corners[[not np.all(plane == corner, axis=1).any() for corner in corners]]
     missing = [at(corner + origin) for corner in bare]

@@ -51,7 +51,7 @@ class ConvexCurves:
         return self._each(lambda array: factor * array)
 
     def rounded(self, decimals: int) -> Self:
-        """Return the curves with all coordinates rounded to a number of decimals."""
+        """Return the curves with all coordinates and lengths rounded to a number of decimals."""
         return self._each(lambda array: array.round(decimals))
 
     def joined(self, others: "ConvexCurves") -> Self:

@@ -173,9 +173,9 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return the visible strains and the temperature of a state as formulas, or ["no strain"].
+        """Return the strains above FAINT and the temperature of a state, unless 0, as formulas; or ["no strain"].
 
-        A path with many strains shows the leading strain and its stress; a load shows the components in its section.
+        A path with many strains shows the leading strain and its stress; analysis `load` shows the given components.
         """
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]

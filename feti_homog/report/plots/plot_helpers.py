@@ -235,7 +235,7 @@ def magnification(displacement: float, size: float, opening: float = 0.0, larges
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
     """Return `chosen` or, for "auto", the stress conjugate to the largest strain of the states.
 
-    Only strains with a macroscopic stress count, or all if no stress acts.
+    Strains without a macroscopic stress are left out, unless no stress acts at all.
     """
     if chosen != "auto":
         return chosen

@@ -12,7 +12,7 @@ LEAST_SHARE, MOST_DEVIATIONS = 0.01, 3.0
 
 
 def fit_text(document: Document, axes: str = "", stress_unit: str = "") -> str:
-    """Return the fit tables: unknowns, correlations, measured values.  `axes` is a remark on misleading names."""
+    """Return the fit tables: unknowns, correlations, data, sum of squares.  `axes` is a remark after a misfit."""
     measured, is_single = document["measured"], len({datum["test"] for datum in document["measured"]}) == 1
     tests = ["" if is_single else f"test {datum['test']} " for datum in measured]
     strains = ["" if d["strain"] is None else f"({d['strain_name']} = {d['strain']:g})" for d in measured]
