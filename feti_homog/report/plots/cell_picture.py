@@ -130,7 +130,7 @@ def mesh_error(cell: drawn_cell.DrawnCell, look: plot_helpers.Look = plot_helper
     bar.set_label(fill("local error / mean energy (both per area)", int((picture.get_figheight() - 1.2) / 0.075)))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
-    axes.set_title(_title(file.attrs, "estimated error of the mesh, largest of all states (dark: large)"))
+    axes.set_title(_title(file.attrs, "estimated mesh error, largest of all states"))
     return picture
 
 
