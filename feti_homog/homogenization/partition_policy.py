@@ -28,8 +28,8 @@ MOST_POISSON = 0.45
 MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
-# Bytes of a rank: without degrees of freedom, per degree of freedom, per subdomain, more on springs, and per multiplier
-# with influence columns.  For 37 cells, estimates are 0.78 to 1.27 times the measured memory.
+# Bytes of a rank: without degrees of freedom, per degree of freedom, per plane subdomain, more on springs, and per
+# multiplier with influence columns.  For 37 cells, estimates are 0.78 to 1.27 times the measured memory.
 BASE_BYTES, DOF_BYTES, SUBDOMAIN_BYTES, SPRING_BYTES, COLUMN_BYTES = 1.5e8, 9.9e2, 7.0e5, 7.7e5, 2.6e4
 INTERIOR_BYTES = 4.7e2  # more per degree of freedom if the run keeps the factors of interiors
 # More per displacement of the largest problem in a cell of one factor; for seven cells, estimates are within 3 %.
@@ -184,8 +184,8 @@ def memory(
     of_interiors = dofs * INTERIOR_BYTES if keeps_interiors(case) else 0.0
     factors = max(components) * max(nodes) * FACTOR_BYTES if max(subdomains) == 1 else of_interiors
     springs = SPRING_BYTES if phase_laws.has_springs(case) else 0.0
-    matrices = max(subdomains) * (SUBDOMAIN_BYTES + springs) + columns / len(nodes) * COLUMN_BYTES
-    return BASE_BYTES + dofs * DOF_BYTES + factors + matrices
+    matrices = sum(components) / 2 * max(subdomains) * (SUBDOMAIN_BYTES + springs)
+    return BASE_BYTES + dofs * DOF_BYTES + factors + matrices + columns / len(nodes) * COLUMN_BYTES
 
 
 def memory_to_the_end(case: Case, before: float, multipliers: int, columns: int, ranks: int) -> float:
