@@ -235,8 +235,8 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
 
 
 def _law_warnings(case: Case) -> list[str]:
-    """List warnings about cohesive laws: energies depend on the order of modes, or teeth exceed the peak traction."""
-    if not phase_laws.has_softening(case):
+    """List warnings about cohesive laws on paths: energies depend on the order of modes, or teeth exceed the peak."""
+    if not (case.section.is_followed and phase_laws.has_softening(case)):
         return []
     from feti_homog.interface.laws import law_of_sections  # few laws soften
 

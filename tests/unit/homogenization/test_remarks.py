@@ -88,6 +88,9 @@ def test_teeth_that_exceed_the_peak_are_a_warning_however_they_are_chosen(key):
     assert events == [70 * count for count in counts]
     excess = rho ** (1 / (2 * (counts or [3])[0])) - 1.0
     assert all(f"exceeds the peak traction by {excess:.1%}" in line for line in found) and (found or excess <= 0.02)
+    onsets = content | {"analysis": {"type": "envelope", "plane": "strain"}, "envelope": {"plane": ["S11", "S22"]}}
+    onsets.pop("path")  # onsets do not depend on teeth
+    assert not warnings(Case.parse(onsets), 1.0, 1e-9, np.zeros(0))
 
 
 @pytest.mark.parametrize(
