@@ -164,7 +164,7 @@ class Angle(AnalysisSection):
 
 @dataclass(frozen=True, kw_only=True)
 class Envelope(AnalysisSection):
-    """The onset of debonding on rays from zero, in a plane of two macroscopic stresses or strains."""
+    """The onset of debonding, or of softening without teeth, on rays from zero in a plane of stresses or strains."""
 
     breaks: ClassVar[bool] = True
 
