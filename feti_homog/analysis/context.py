@@ -70,7 +70,7 @@ class CellLoads:
         return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
 
     def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the largest ratio of strains in the responses to strains of the bonded cell under the same load."""
+        """Return the largest ratio of a response's strain to the bonded cell's strain under the same load."""
         pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
         return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
 

@@ -92,7 +92,7 @@ class Case:
         both symmetric entries; None removes a key.  Raises like `parse`.
         """
         (document, folder), faults = self.source, list[str]()
-        changed = with_values(document, dict(leaves(to_document(changes), is_key)), faults)
+        changed = with_values(document, dict(leaves(to_document(changes), lambda path, _: is_key(path))), faults)
         if faults:
             raise CaseError(*faults)
         return parse(changed, folder)

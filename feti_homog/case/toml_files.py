@@ -120,8 +120,8 @@ def leaves(
             yield path, value
 
 
-def is_key(path: TomlPath, table: object = None) -> bool:
-    """Return whether a path names a key, such as `load.to`, and not a section; the `table` there does not matter."""
+def is_key(path: TomlPath) -> bool:
+    """Return whether a path names a key, such as `load.to`, and not a section, such as `material.fibre`."""
     return path[:-1] not in ((), ("material",), ("interface",))
 
 

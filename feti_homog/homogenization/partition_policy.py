@@ -29,7 +29,7 @@ MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 # Bytes of a rank: without degrees of freedom, per degree of freedom, per plane subdomain, more on springs, and per
-# multiplier with influence columns.  For 37 cells, estimates are 0.78 to 1.27 times the measured memory.
+# multiplier with influence columns.  For 37 cells, estimates are 0.78 to 1.24 times the measured memory.
 BASE_BYTES, DOF_BYTES, SUBDOMAIN_BYTES, SPRING_BYTES, COLUMN_BYTES = 1.5e8, 9.9e2, 7.0e5, 7.7e5, 2.6e4
 INTERIOR_BYTES = 4.7e2  # more per degree of freedom if the run keeps the factors of interiors
 # More per displacement of the largest problem in a cell of one factor; for seven cells, estimates are within 3 %.

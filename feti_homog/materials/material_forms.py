@@ -189,7 +189,7 @@ MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compres
 
 
 def criterion(strength: PhaseStrength) -> str:
-    """Return the name of the criterion that the keys select; ValueError unless they are all keys of one criterion."""
+    """Return the name of the given criterion; ValueError if keys are missing, or belong to several criteria."""
     names_given = [name for names in CRITERIA.values() for name in names if getattr(strength, name) is not None]
     for title, names in CRITERIA.items():
         if names_given == list(names):

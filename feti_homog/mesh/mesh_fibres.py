@@ -101,7 +101,7 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find the fibres (k,) with a boundary on concentric ellipses, the largest of which surrounds the fibre.
+    """Find the fibres (k,) that lie inside an ellipse and whose other boundaries are smaller, concentric ellipses.
 
     Also returns, for each of these fibres, a plane edge (k,) on the largest ellipse, and the mask (k,) of round fibres.
     """

@@ -1,4 +1,4 @@
-"""Arrange the fibres of a table on the torus: merge images of one fibre, move fibres of cut windows, report faults."""
+"""Arrange a fibre table on the torus: merge periodic images, move fibres of cut windows, report faults."""
 
 from dataclasses import replace
 

@@ -97,7 +97,7 @@ class InterfacePart:
 
 @dataclass(frozen=True, repr=False)
 class StatePart:
-    """The strains, stresses and labels of one state, and this rank's part of its fields."""
+    """A stored state: its macroscopic strains and stresses, its label, and this rank's part of the fields."""
 
     strain: Float = described(f"macroscopic strain {', '.join(voigt.STRAINS)}", shape="(3,)")
     stress_mean: Float = described(f"mean stress {', '.join(voigt.STRESSES)}", records.STRESS, "(3,)", name="stress")

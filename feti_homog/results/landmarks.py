@@ -158,11 +158,11 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
             names = ("temperature",) if is_thermal else (peak["stress_name"], peak["strain_name"])
             ends = {name: [0.0, *table[name]][k - 1 : k + 1] for name in names}
             if leg[numbers[k - 1]] == 1:
-                share = ratios[k - 1 : k + 1]
-                places = [f"at about {name} = {np.interp(1.0, share, pair):.4g}" for name, pair in ends.items()]
+                way, share = "at about", ratios[k - 1 : k + 1]
+                places = [f"{name} = {np.interp(1.0, share, pair):.4g}" for name, pair in ends.items()]
             else:
-                places = [f"between {name} = {a:.4g} and {b:.4g}" for name, (a, b) in ends.items()]
-            passed = f"[material.{phase['phase']}] strength: the utilisation reaches 1 {', '.join(places)}"
+                way, places = "between", [f"{name} = {a:.4g} and {b:.4g}" for name, (a, b) in ends.items()]
+            passed = f"[material.{phase['phase']}] strength: the utilisation reaches 1 {way} {', '.join(places)}"
             lines.append(f"{passed}{subject} takes the phase as elastic beyond")
     return lines
 

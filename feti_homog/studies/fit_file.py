@@ -112,7 +112,7 @@ class FitReader:
                     data.append(Datum(number, name, datum.value, datum.std))
                     self._check_std(datum.std, datum.value, f"[{place}] {name}.std")
             of_case = {name: value for name, value in row.items() if name != sections.MEASURED}
-            changes = dict(toml_files.leaves(of_case, toml_files.is_key))
+            changes = dict(toml_files.leaves(of_case, lambda path, _: toml_files.is_key(path)))
             assignments.append(changes)
             for path in changes.keys() & unknowns:
                 name = f"[[{sections.TEST}]] {number + 1}, {wording.dotted_key(path)}"

@@ -19,7 +19,7 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """The statistics of outputs over finished realisations, as arrays of one shape.
+    """Statistics over finished realisations, in arrays of one shape.
 
     `std` and `ci95`, half the 95 % confidence interval of the mean by Student's t, are NaN below two realisations.
     """

@@ -22,7 +22,7 @@ from feti_homog.typing import Float, Int
 
 
 class ExplicitInterfaceOperator:
-    """The Schur complement S and flexibility S+ of one subdomain, dense (n, n), on its n boundary dofs.
+    """The dense matrices S and S+ (n, n), Schur complement and flexibility, on n boundary dofs of a subdomain.
 
     With fixing nodes on the boundary, the inverse of S + rho Rf Rf^T (`Subdomain.fixing`) is the boundary part of K+.
 
@@ -160,7 +160,7 @@ class CondensedLoads:
 
 
 class ImplicitInterfaceOperator:
-    """The Schur complement S and flexibility S+ of one subdomain on its n boundary dofs, by sparse factors of K."""
+    """The operators S and S+, Schur complement and flexibility, of a subdomain by sparse factors of K."""
 
     is_dense = False
 

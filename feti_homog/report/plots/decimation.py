@@ -47,7 +47,7 @@ class DrawnMesh:
 
     @cached_property
     def places(self) -> Array:
-        """Return a position number for each node (p,), shared by nodes of one body at the same position."""
+        """Number the positions in each body, and return the number of every node's position (p,)."""
         tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]

@@ -142,7 +142,7 @@ def tip_table(document: Document, tips: Document) -> Table:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """Return a list of one table, the largest G by angle and load (for one load, all its rates); [] without tips."""
+    """Return [table of the largest G by angle and load], for a single load with all rates; [] without tips."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:

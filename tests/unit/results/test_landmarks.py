@@ -135,8 +135,8 @@ def test_on_later_legs_bonds_that_break_at_one_load_make_a_jump() -> None:
 @pytest.mark.parametrize(
     ("utilisation", "place"),
     [
-        ([2.0, 2.5, 9.0, 9.0], "at about S11 = 5, at about E11 = 0.125, before the peak"),  # on the way to point 0
-        ([0.5, 1.5, 9.0, 9.0], "at about S11 = 15, at about E11 = 0.375, before"),  # half way between two points
+        ([2.0, 2.5, 9.0, 9.0], "at about S11 = 5, E11 = 0.125, before the peak"),  # on the way to point 0
+        ([0.5, 1.5, 9.0, 9.0], "at about S11 = 15, E11 = 0.375, before"),  # half way between two points
         ([0.2, 0.9, 1.1, 9.0], None),  # beyond the peak
         ([0.2, 0.3, 0.3, 0.9], None),
         (None, None),
@@ -159,4 +159,4 @@ def test_on_a_later_leg_a_phase_passes_its_strength_in_an_interval() -> None:
     case = {"path": {"method": "events", "waypoints": [{"S11": 40.0}, {"S11": 30.0}]}}
     document = {"case": case, "path": path([20.0, 40.0, 39.0, 38.5]), "phase_stresses": [phase]}
     (line,) = passed_strengths(document, peak, range(4))
-    assert "reaches 1 between S11 = 39 and 38.5, between E11 = 0.75 and 1; the path takes" in line
+    assert "reaches 1 between S11 = 39 and 38.5, E11 = 0.75 and 1; the path takes" in line
