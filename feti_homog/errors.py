@@ -59,9 +59,14 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge, a check failed, or nothing carries the load; a written result says `not converged`."""
+    """A solve did not converge, a check failed, or nothing carries the load; a written result says `not converged`.
+
+    Attributes:
+        result: the computed part as a `Result`, if `feti_homog.run` raised the error after an analysis; else None.
+    """
 
     exit_code = ExitCode.UNCONVERGED
+    result: Any = None
 
 
 class NotCarriedError(ConvergenceError):

@@ -74,8 +74,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             if not point.state.converged:  # the next break would follow from an unconverged state
                 break
             if len(entries) == path.max_events and point.load_factor < 1.0:
-                end = 'the path was not finished: result.json has status "not converged"'
-                cure = f"--resume with a higher max_events goes on{context.case.fewer_events}"
+                end = 'the path was not finished: the result has status "not converged"'
+                by = "--resume with " if context.directory else ""
+                cure = f"{by}a higher max_events goes on{context.case.fewer_events}"
                 context.checks.faults.append(f"[path] max_events = {path.max_events}: {end}; {cure}")
                 break
     if last is None:

@@ -56,9 +56,7 @@ def run(
         progress.say(line)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
-    if result.faults:
-        raise ConvergenceError(*result.faults)
-    return result
+    return _without_faults(result)
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
@@ -74,8 +72,15 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         context = AnalysisContext.of(cell, progress, states)
         result = _result(context, _analyse(context), states.fields())
     _print_summary(result, progress)
+    return _without_faults(result)
+
+
+def _without_faults(result: Result) -> Result:
+    """Return the result; raise ConvergenceError, which holds the result, if it has faults."""
     if result.faults:
-        raise ConvergenceError(*result.faults)
+        error = ConvergenceError(*result.faults)
+        error.result = result
+        raise error
     return result
 
 

@@ -182,10 +182,12 @@ def test_cards_and_certificates_name_the_points_of_an_unfinished_path(comm, shar
 
 
 def test_a_result_that_has_all_points_is_no_unfinished_path(comm, shared_path):
-    """A path cut off by `max_events` keeps its checkpoint; further events are newer than its result."""
+    """A path cut off by `max_events` keeps its checkpoint, and its error the points; later events are newer."""
     short = Case.parse(CASE | {"path": CASE["path"] | {"max_events": 4}})
-    with pytest.raises(ConvergenceError, match="max_events"):
-        run(short, comm, out=shared_path)
+    for out, way in ((None, "a higher max_events"), (shared_path, "--resume with a higher max_events")):
+        with pytest.raises(ConvergenceError, match=f"max_events = 4: .*; {way} goes on") as error:
+            run(short, comm, out=out)
+        assert len(error.value.result.path) == 4 and error.value.result.faults == error.value.faults
     assert on_root(comm, output_folder.latest, shared_path)["status"] == "not converged"
     with interrupted(), pytest.raises(RuntimeError, match="interrupted"):
         run(Case.parse(CASE), comm, out=shared_path, resume=True)
