@@ -36,6 +36,7 @@ class CellSummary:
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance by which a node in a user's mesh was moved to make opposite sides match.
         origin: lower left corner of the cell in the user's coordinates; all other positions are relative to the corner.
+        has_corners: whether straight edges between phases, or beside voids, meet at an angle.
         voids, moved_tips: number of voids; for each interface, the tips that the mesher moved.
         match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
@@ -63,6 +64,7 @@ class CellSummary:
     match_distance: float | None
     remarks: tuple[str, ...]
     shift: Float
+    has_corners: bool = False
     across: bool = False
     interface_nodes: int | None = None
 
@@ -87,8 +89,8 @@ class CellSummary:
         return mesh_fibres.coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     @property
-    def has_corners(self) -> bool:
-        """Whether fibres may have corners: shapes other than circles and ellipses."""
+    def has_other_shapes(self) -> bool:
+        """Whether fibres have shapes other than circles and ellipses."""
         return bool(np.isnan(self.frames[self.fibre_bodies]).any())
 
     def fibre_number(self, constituent: Int) -> Int:
@@ -174,6 +176,7 @@ def distribute(
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], radii),
         remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs, radii), *text),
         shift=mesh.shift,
+        has_corners=mesh_fibres.has_corners(torus),
         across=across,
         interface_nodes=bonds if across else None,
     )

@@ -116,7 +116,7 @@ def energy_errors(
         state = responses[0].state
         beyond_tips, along_sides = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
         elements, arcs = elements + beyond_tips / area, arcs + along_sides / area
-    is_uneven = cell.summary.has_corners or (lattice.order == 2 and bool(cell.case.interfaces))
+    is_uneven = cell.summary.has_other_shapes or (lattice.order == 2 and bool(cell.case.interfaces))
     smallest = LEAST_SHARE if is_uneven else LEAST_OF_TWO[lattice.order]
     # If faces touch at different positions in two responses, the energy is not bilinear: nothing cancels.
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, 1.0 if contact else smallest)
@@ -143,7 +143,7 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     lattice, case = cell.lattice, cell.case
     pieces = (s.submesh for s in cell.subdomains)
     straight = any(bool((piece.at_void[piece.edge_class] & (piece.turns == 0)).any()) for piece in pieces)
-    if not lattice.halvings or cell.summary.has_corners or cell.comm.allreduce(straight, MPI.LOR):
+    if not lattice.halvings or cell.summary.has_other_shapes or cell.comm.allreduce(straight, MPI.LOR):
         return False
     # Between given displacements, the pressure of a piece on a coarser mesh is its change of volume times lambda.
     if lattice.order == 2 and locks(cell.parts, cell.comm):

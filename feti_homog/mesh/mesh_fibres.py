@@ -14,6 +14,8 @@ from feti_homog.typing import Bool, Float, Int
 # Limits, relative to the longer semi-axis: distance between the centres of nested curves, and difference between the
 # thicknesses of a coating along both semi-axes.
 SAME_CENTRE, SAME_LENGTH = 1e-9, 1e-6
+# Least angle in degrees at a corner: smaller angles are between the chords of a curve, or of rounded coordinates.
+LEAST_CORNER = 15.0
 
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
@@ -98,6 +100,20 @@ def fibre_frames(torus: Torus) -> Float:
     if len(bodies):
         frames[bodies] = torus.edge_ellipses.frames[edge]
     return frames
+
+
+def has_corners(torus: Torus) -> bool:
+    """Return whether straight edges between phases, or beside voids, meet at an angle above LEAST_CORNER."""
+    is_straight = torus.is_outline
+    is_straight[torus.torus_edge[torus.arcs]] = False
+    ends = torus.low_copies(is_straight)
+    along = np.diff(torus.mesh.points[ends], axis=1)[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    nodes, node, counts = np.unique(torus.node_class[ends], return_inverse=True, return_counts=True)
+    # Of two unit vectors from a node, the sum has the length 2 sin(angle / 2).
+    sums = np.array([np.bincount(node.ravel(), np.stack([x, -x], axis=1).ravel(), len(nodes)) for x in along.T])
+    angles = np.where(counts == 2, np.linalg.norm(sums, axis=0), 0.0)
+    return bool((counts > 2).any() or (angles > 2.0 * np.sin(np.radians(LEAST_CORNER / 2.0))).any())
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:

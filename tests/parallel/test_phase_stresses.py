@@ -143,7 +143,10 @@ def test_stresses_rise_beside_tips_and_corners(comm):
     for angle in (90.0, 360.0):  # one fibre of two: without any bond it has no tips
         arc = {"interface": {"debonded": [{"fibre": 1, "centre": 0.0, "angle": angle}]}}
         assert ("beside tips of debonding" in remarks(two, **arc)) == (angle < 360.0)
-    assert "they rise" not in remarks(CELL)
+    assert "rise without limit" not in remarks(CELL)
+    square = {"x": 0.5, "y": 0.5, "radius": 0.3, "sides": 4}
+    table = {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.2}
+    assert "beside corners of phases rise without limit" in remarks(table | {"fibre_list": [square]})
 
 
 def test_only_tips_in_one_rigid_interface_raise_stresses(comm):

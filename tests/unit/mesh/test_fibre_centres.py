@@ -1,4 +1,4 @@
-"""Numbers and centres of fibres, and the curves that a user's mesh has debonded."""
+"""Numbers, centres and corners of fibres, and the curves that a user's mesh has debonded."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, 
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.mesh_fibres import fibre_circles
+from feti_homog.mesh.mesh_fibres import fibre_circles, has_corners
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 
@@ -79,6 +79,16 @@ def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):
     grid(inside).write(tmp_path / "good.msh")
     _, centres = centres_of(read(tmp_path / "good.msh"))
     assert centres[1] % 1.0 == pytest.approx([1 - 1 / 24, 1 - 1 / 24])
+
+
+@pytest.mark.parametrize(("fibre", "expected"), [
+    (lambda x, y: abs(x - 0.5) < 0.25, False),
+    (lambda x, y: max(abs(x - 0.5), abs(y - 0.5)) < 0.25, True),
+    (lambda x, y: (x < 0.5) == (y < 0.5), True),
+], ids=["stripe", "square", "checkerboard"])  # fmt: skip
+def test_stripes_have_no_corners(fibre, expected, tmp_path):
+    grid(fibre).write(tmp_path / "good.msh")
+    assert has_corners(Torus.of(read(tmp_path / "good.msh"))) == expected
 
 
 @pytest.mark.parametrize("lines", [RIGHT_SIDE, ALL_SIDES], ids=["open", "closed"])

@@ -17,6 +17,7 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
+from feti_homog.mesh.mesh_fibres import has_corners
 from feti_homog.mesh.outline.graded_size import MIN_EDGES_AROUND, MeshSizes
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.microstructure.arrangements import Arrangement
@@ -45,6 +46,11 @@ def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
     corner = rounding / radius / np.cos(np.pi / sides) if sides else 0.0
     row = {"x": x, "y": y, "radius": radius, "sides": sides, "corner": corner, "angle": angle, "inner_radius": 0.0}
     return {name: np.array([value]) for name, value in ({"a": np.nan, "b": np.nan} | row).items()}
+
+
+def test_rounded_polygons_have_no_corners():
+    for corner in (0.0, 0.3):
+        assert has_corners(Torus.of(generate(case_of(SQUARE | {"corner": corner}).cell))) == (corner == 0.0)
 
 
 def gap_between(*rows):
