@@ -75,7 +75,9 @@ class Case:
         document, folder = to_document(values), Path(folder)
         contents, faults = _read_sections(document, folder)
         if not faults:
-            faults += laws.contrast_lines(contents["materials"], contents["analysis"].plane)[0]
+            of_materials = contents["materials"], contents["analysis"].plane
+            faults += laws.contrast_lines(*of_materials)[0]
+            faults += cell_sizes.derivative_faults(*of_materials) if contents["output"].sensitivities else ()
         if not faults:
             cell, materials = contents["cell"], contents["materials"]
             plane, free_faces = contents["analysis"].plane, bool(contents["interfaces"]) or cell.has_voids
@@ -143,14 +145,18 @@ class Case:
         """List valid but probably unintended settings, one per line."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
-        least = min(float(laws.stiffness_of(m, self.analysis.plane).max()) for m in self.materials.values())
+        stiffness = {name: float(laws.stiffness_of(m, self.analysis.plane).max()) for name, m in self.materials.items()}
         bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
-        tables: list[tuple[str, Any, str]] = [("interface", bond, "strength") for bond in bonds]
-        tables += [(f"material.{phase}.strength", m.strength, "") for phase, m in self.materials.items() if m.strength]
-        units, question = list[str](), f"above {least:g}, the stiffness of a phase: are both in one unit?"
-        for section, table, end in tables:
-            strengths = {name: value or 0.0 for name, value in vars(table).items() if name.endswith(end)}
-            high = {name: value for name, value in strengths.items() if least < value < float("inf")}
+        strengths = {name: material.strength for name, material in self.materials.items() if material.strength}
+        tables: list[tuple[str, Any, str, float]] = [
+            ("interface", b, "strength", min(stiffness.values())) for b in bonds
+        ]
+        tables += [(f"material.{name}.strength", s, "", stiffness[name]) for name, s in strengths.items()]
+        units = list[str]()
+        for section, table, end, least in tables:
+            given = {name: value or 0.0 for name, value in vars(table).items() if name.endswith(end)}
+            high = {name: value for name, value in given.items() if least < value < float("inf")}
+            question = f"above {least:g}, the stiffness of a phase: are both in one unit?"
             units += [f"[{section}] {name} = {value:g}: {question}" for name, value in high.items()]
         return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
 

@@ -21,6 +21,8 @@ LOCKING_POISSON = 0.49
 # Poisson's ratio above which rounding may fail the checks. At 0.4999999, with fibres a thousandth as stiff
 # as the matrix, iterative refinement lowers the error of energies from 2e-4 to 1e-9.
 ROUNDING_POISSON = 0.49999999
+# Largest Poisson's ratio with derivatives to three digits: their rounding errors grow with 1 / (1 - 2 nu)^2.
+DIFFERENTIABLE_POISSON = 0.499999
 
 
 def is_mixed(order: int, material: material_forms.Material, plane: str) -> bool:
@@ -33,6 +35,12 @@ def warnings(materials: Mapping[str, material_forms.Material], plane: str) -> li
     words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
     lines = _above(ROUNDING_POISSON, materials, plane)
     return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
+
+
+def derivative_faults(materials: Mapping[str, material_forms.Material], plane: str) -> list[str]:
+    """List nearly incompressible phases, for which rounding hides derivatives, one per line."""
+    words = f"derivatives (sensitivities, uncertainty) need at most {DIFFERENTIABLE_POISSON}"
+    return [f"{line}: {words}" for line in _above(DIFFERENTIABLE_POISSON, materials, plane)]
 
 
 def remarks(materials: Mapping[str, material_forms.Material], plane: str) -> tuple[str, ...]:

@@ -169,7 +169,7 @@ def _lame(material: material_forms.Isotropic, plane: str) -> tuple[float, float]
     """Return Lame's constant, reduced in plane stress, and the shear modulus; ValueError if the former is infinite."""
     state = voigt.PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
-        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.499999 serves")
     shear = material.young / (2.0 * (1.0 + material.poisson))
     thickness = 1.0 - material.poisson if state.is_sheet else 1.0 - 2.0 * material.poisson
     return 2.0 * shear * material.poisson / thickness, shear

@@ -157,9 +157,10 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
 
 def check_phases(findings: Findings, cell: DiscreteCell, state: State, number: int) -> None:
     """Check the largest stresses of the phases in state `number`, their positions and utilisations."""
-    table = cell.files.document.get("phase_stresses", [])
+    table, conducts = cell.files.document.get("phase_stresses", []), "effective_conductivity" in cell.files.document
     limits = {name: phase_constants(cell.files.case, name).get("strength") for name in cell.files.phases}
-    findings.require(LAW, bool(table) or not any(limits.values()), "phase_stresses, which strengths need")
+    is_complete = bool(table) or conducts or not any(limits.values())
+    findings.require(LAW, is_complete, "phase_stresses, which strengths need")
     if not table:
         return
     stress, points = _stresses(cell, state)

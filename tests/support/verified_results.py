@@ -178,7 +178,7 @@ CONDUCTOR, TENSOR = {"conductivity": 0.2}, [[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [
 CONDUCTION: dict[str, dict[str, Any]] = {
     "conductivity": {
         "cell": HEXAGONAL | {"order": 2},
-        "matrix": CONDUCTOR,
+        "matrix": MATRIX | CONDUCTOR | {"strength": {"principal": 1.0}},  # which conduction does not use
         "fibre": {"conductivity": {"axial": 10.0, "transverse": 1.0}},
         "plane": "conduction",
     },

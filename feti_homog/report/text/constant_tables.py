@@ -12,6 +12,7 @@ import numpy as np
 
 from feti_homog.materials import engineering_constants, voigt
 from feti_homog.microstructure import phase_names
+from feti_homog.report.text.point_tables import columns_without_noise
 from feti_homog.report.text.tables import UNKNOWN, Column, Table, number, stress_label, without_noise
 from feti_homog.typing import Document
 
@@ -242,11 +243,16 @@ def sensitivities(document: Document) -> list[Table]:
         return []
     constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4
     at = [constants.index(name) for name in shown(constants)]
-    values, slopes, shares = [section["constant_values"][k] for k in at], list[list[Any]](), list[list[Any]]()
+    exact = dict(zip(constants, section["constant_values"], strict=True))
+    if (point := document.get("load")) is not None:  # components that are zero by symmetry have no elasticity
+        for components, key in zip(voigt.voigt_names(len(point["strain"])), ("strain", "stress"), strict=True):
+            exact |= zip(components, columns_without_noise([point[key]])[0].tolist(), strict=True)
+    values, slopes, shares = [exact[constants[k]] for k in at], list[list[Any]](), list[list[Any]]()
     for j, (name, parameter) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
         row = [section["derivatives"][k][j] for k in at]
         changes = [without_noise(slope * parameter / c) if c else UNKNOWN for slope, c in zip(row, values, strict=True)]
-        slopes.append([name, *(f"{slope if change else 0.0:.3g}" for slope, change in zip(row, changes, strict=True))])
+        is_zero = [parameter and not change for change in changes]
+        slopes.append([name, *(f"{0.0 if zero else slope:.3g}" for slope, zero in zip(row, is_zero, strict=True))])
         shares.append([name, *changes])
     text = "Elasticities, the relative change of a constant by that of a parameter"
     text += "; contact at fixed status" if section.get("at_fixed_status") else ""

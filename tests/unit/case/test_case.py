@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import pickle
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -246,6 +247,10 @@ def test_elements_of_nearly_incompressible_phases_are_quadratic(tmp_path, sizes)
         case_of(tmp_path, locking.replace("[cell]\n", "[cell]\norder = 1\n"))
     (warning,) = case_of(tmp_path, sized.replace("0.299", "0.499999999")).warnings()
     assert "so near to 0.5 that rounding may exceed the tolerance" in warning
+    for ratio, is_faulty in (("0.499999", False), ("0.4999995", True)):
+        differentiated = sized.replace("0.299", ratio) + "[output]\nsensitivities = true\n"
+        with pytest.raises(CaseError, match=r"need at most 0.499999$") if is_faulty else nullcontext():
+            case_of(tmp_path, differentiated)
 
 
 def test_phases_of_any_name(tmp_path):

@@ -11,7 +11,7 @@ from feti_homog.case.cases import parse
 
 
 def test_strengths_above_a_stiffness_are_warned_of():
-    """E / (1 - nu^2) of plane stress is 3.2: a matrix in GPa, strengths in MPa."""
+    """E / (1 - nu^2) of plane stress is 3.2: a matrix in GPa, strengths in MPa; a fibre may be stronger than that."""
     asked = {
         "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
         "material": {"matrix": {"young": 3.0, "poisson": 0.25}, "fibre": {"young": 7e4, "poisson": 0.2}},
@@ -19,9 +19,9 @@ def test_strengths_above_a_stiffness_are_warned_of():
         "path": {"waypoints": [{"E11": 0.01}]},
         "interface": {"normal_strength": 60.0, "tangential_strength": 3.1},
     }
-    asked["material"]["fibre"]["strength"] = {"principal": 3.3}
+    asked["material"]["matrix"]["strength"] = asked["material"]["fibre"]["strength"] = {"principal": 3.3}
     end = "above 3.2, the stiffness of a phase: are both in one unit?"
-    expected = (f"[interface] normal_strength = 60: {end}", f"[material.fibre.strength] principal = 3.3: {end}")
+    expected = (f"[interface] normal_strength = 60: {end}", f"[material.matrix.strength] principal = 3.3: {end}")
     assert parse(asked, Path()).warnings() == expected
 
 

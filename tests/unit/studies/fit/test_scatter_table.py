@@ -104,6 +104,18 @@ def test_derivatives_of_secants_and_of_expansions_in_any_unit_are_printed():
     }  # fmt: skip
     _, slopes = constant_tables.sensitivities({"sensitivities": small})
     assert "1.9e-16" in slopes.html and ">0<" in slopes.html
+    _, slopes = constant_tables.sensitivities({"sensitivities": small | {"parameter_values": [0.0, 7e10]}})
+    assert "1.9e-16" in slopes.html  # also where the parameter is zero
     secants = small | {"constants": SECANTS, "constant_values": [1.0] * 21, "derivatives": [[1.0, 1.0]] * 21}
     heads = constant_tables.sensitivities({"sensitivities": secants})[0].lines[1].split()
     assert heads == ["C11", "C22", "C33", "C44", "C55", "C66", "C12", "C13", "C14"]
+
+
+def test_a_strain_that_symmetry_makes_zero_has_no_elasticity():
+    found = {
+        "parameters": ["material.matrix.young"], "parameter_values": [3e9], "at_fixed_status": False,
+        "constants": ["E11", "gamma12"], "constant_values": [2e-4, 7e-16], "derivatives": [[1e-13], [3e-22]],
+    }  # fmt: skip
+    load = {"strain": [2e-4, 0.0, 7e-16], "stress": [0.0, 30.0, 0.0]}
+    elasticities, _ = constant_tables.sensitivities({"sensitivities": found, "load": load})
+    assert elasticities.rows[0][1:] == [pytest.approx(1.5), "-"]
