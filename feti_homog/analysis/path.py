@@ -237,7 +237,9 @@ def _completed(
         several = "with friction such a fibre may have several equilibria under one load"
         choice = "the path follows one of them, which depends on the order of nodes"
         context.notes.append(f"[path] no bond of {fibres} holds: {several}, and {choice}")
-    if context.case.has_friction and not any(entry["open"] or entry["closed"] for entry in entries):
+    rubs = any(bond.friction_on_damage for bond in context.case.interfaces)
+    rubbing = "open", "closed", *(("damaged_share",) if rubs else ())
+    if context.case.has_friction and not any(entry.get(name) for entry in entries for name in rubbing):
         context.notes.append("[interface] friction: without effect, for no face is debonded and no bond breaks")
     for number, mark in marks.items():
         entries[number]["mark"] = mark

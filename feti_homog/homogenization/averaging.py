@@ -255,6 +255,7 @@ class FibreInterfaces:
         """Sum the interface lengths of each fibre.  Collective."""
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
+        self._numbers = cell.summary.numbers
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
         self._length = self.length(np.ones(len(self._fibre), bool))
         of_coating = self.length(~cell.summary.is_fibre[self._nodes.fibre])
@@ -268,9 +269,11 @@ class FibreInterfaces:
         return distributed_arrays.allreduce_sum(self._comm, sums)
 
     def loose(self, status: Status) -> list[int]:
-        """List the numbers, from 1, of fibres with an interface but no intact bond.  Collective."""
-        is_loose = (self.length(status == Contact.BONDED) == 0.0) & (self._length > 0.0)
-        return [int(number) for number in np.flatnonzero(is_loose) + 1]
+        """List the numbers, from 1, of fibres with an interface on which no bond is intact.  Collective."""
+        inner, count = self._nodes.fibre, len(self._numbers)
+        lengths = [np.bincount(inner, self._nodes.length * which, count) for which in (status == Contact.BONDED, 1.0)]
+        bonded, length = distributed_arrays.allreduce_sum(self._comm, np.stack(lengths))
+        return [int(number) for number in np.unique(self._numbers[(bonded == 0.0) & (length > 0.0)])]
 
     def angle(self, length: Float) -> Float:
         """Convert interface lengths (f,) to degrees: by the radius of round, uncoated fibres, else as shares of 360."""

@@ -205,7 +205,7 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
     law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
     ratio = length / radii.mean() if len(radii) else 1.0
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
-    zone = f"E' G / N^2 = {length:.3g} long"
+    zone = f"E' G / s^2 = {length:.3g} long with the strength s = {strength:.3g}"
     is_doubtful = softens and not 0.01 <= ratio <= 100.0  # perhaps wrong units
     if is_doubtful:
         zone += f" ({ratio:.2g} fibre radii: is the unit of toughness that of stress times length?)"

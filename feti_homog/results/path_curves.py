@@ -113,13 +113,17 @@ def temperature_of(document: Document, number: int) -> float | None:
 
 
 def largest_of_legs(document: Document) -> Iterator[tuple[int, int, int]]:
-    """Yield (leg, component with the largest strain change, point of its largest stress) from leg 2 on."""
+    """Yield (leg, component with the largest strain change, point of its largest stress), unless there is one leg.
+
+    The point that ends a leg also begins the next leg.
+    """
     leg, stress = legs_of(document), stresses(document)
     strain = np.array([point["strain"] for point in document["path"]])
-    for number in range(2, legs(document) + 1):
+    for number in range(1, legs(document) + 1) if legs(document) > 1 else ():
         points = np.flatnonzero(leg == number)
         if len(points):
-            change = np.abs(strain[points] - strain[max(points[0] - 1, 0)]).max(axis=0)
+            change = np.abs(strain[points] - (strain[points[0] - 1] if points[0] else 0.0)).max(axis=0)
+            points = np.append(points, max(points[0] - 1, 0))
             changed = changed_components(document, number) or changed_components(document)
             component = max(changed or range(len(change)), key=change.__getitem__)
             yield number, component, int(points[np.abs(stress[points, component]).argmax()])

@@ -263,9 +263,13 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 def note_lines(entries: Sequence[SweepCase], states: Sequence[CaseState]) -> list[str]:
     """Return warnings and remarks of all results; lines that agree up to a colon become one, with a count of cases."""
-    cases: dict[tuple[str, str], list[str]] = {}
+    cases, texts = dict[tuple[str, str], list[tuple[str, str]]](), list[str]()
     for kind in ("warning", "remark"):
         for entry, state in zip(entries, states, strict=True):
             for line in (state.document or {}).get(f"{kind}s", ()):
-                cases.setdefault((kind, line.partition(": ")[0]), []).append(f"{kind}: {entry.folder}: {line}")
-    return [f"{lines[0]} ({len(lines)} cases)" if len(lines) > 1 else lines[0] for lines in cases.values()]
+                cases.setdefault((kind, line.partition(": ")[0]), []).append((entry.folder, line))
+    for (kind, _), found in cases.items():
+        differing = ", some with other numbers" if len({line for _, line in found}) > 1 else ""
+        count = f" ({len(found)} cases{differing})" if len(found) > 1 else ""
+        texts.append(f"{kind}: {': '.join(found[0])}{count}")
+    return texts

@@ -18,6 +18,9 @@ pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
 SOFTENING = {"law": "bilinear", "normal_stiffness": 80.0, "tangential_stiffness": 60.0, "teeth": 3}
 SOFTENING |= {"normal_toughness": 4e-5, "tangential_toughness": 6e-5}
+TOUGH = {
+    f"{mode}_{kind}": x for mode in ("normal", "tangential") for kind, x in (("strength", 0.015), ("toughness", 0.01))
+}
 PHASES = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
 
 
@@ -109,12 +112,26 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize(("bonds", "rubs"), [({}, False), (WHOLE, True)])
-def test_friction_without_debonding_is_remarked(comm, bonds, rubs):
+@pytest.mark.parametrize(("bonds", "rubs"), [
+    ({}, False), (WHOLE, True), (SOFTENING | TOUGH | {"friction_on_damage": True}, True), (SOFTENING | TOUGH, False),
+])  # fmt: skip
+def test_friction_without_debonding_or_damage_is_remarked(comm, bonds, rubs):
     interface, path = {"friction": 0.3} | bonds, {"waypoints": [{"E11": -0.01}, {"E11": 0.01}]}
     result = run(Case.parse(document({"mesh_size": 0.3}, EPOXY_GLASS, "strain", interface, path=path)), comm)
     line = "[interface] friction: without effect, for no face is debonded and no bond breaks"
     assert (line in result.remarks) is not rubs
+
+
+@pytest.mark.one_rank
+def test_a_fibre_that_is_loose_in_its_bonded_coating_is_remarked(comm):
+    cell, coated = {"mesh_size": 0.3, "coating": 0.2}, dict(zip(("matrix", "fibre"), EPOXY_GLASS, strict=True))
+    asked = document(cell, EPOXY_GLASS, "strain", {}, path={"to": {"gamma12": 0.01}})
+    asked["material"] = coated | {"coating": EPOXY_GLASS[0]}
+    asked["interface"] = [
+        WHOLE | {"between": ["fibre", "coating"], "friction": 0.3},
+        {"between": ["coating", "matrix"], "normal_strength": 1e3, "tangential_strength": 1e3},
+    ]
+    assert any("no bond of fibre 1 holds" in remark for remark in run(Case.parse(asked), comm).remarks)
 
 
 @pytest.mark.one_rank

@@ -81,7 +81,12 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
         text += f"; mesh error of the energy {', '.join(parts)}"
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
-    for leg, k, number in path_curves.largest_of_legs(document):
+    legs: dict[tuple[int, int], int] = {}
+    for leg, *place in path_curves.largest_of_legs(document):
+        legs.setdefault(
+            (place[0], place[1]), leg
+        )  # a leg that unloads may begin at the largest stress of the leg before
+    for (k, number), leg in legs.items():
         strain, stress = document["path"][number]["strain"][k], path_curves.stresses(document)[number, k]
         if strains[k] != peak["strain_name"] and stress:
             name, at = stress_names[k] + stress_label(document), _load_at(document, number, strains[k], strain)
@@ -122,8 +127,9 @@ def _path_energies(document: Document, label: str) -> list[str]:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
         ends = [points[number] for number in path_curves.ends_of_legs(document)]
         for point in reversed(ends[:-1]):
-            pair = np.array([point["strain"], ends[-1]["strain"]])
-            if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():  # a closed loop
+            names = [name for name in ("strain", "temperature") if name in point]
+            loads = [np.array([point[name], ends[-1][name]]) for name in names]
+            if all(np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max() for pair in loads):  # a closed loop
                 lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
                 break
     if "dissipation_ratio" in last:

@@ -172,14 +172,16 @@ def test_teeth_above_the_peak_traction_are_warned_of_in_any_section(tolerance):
 
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 1.0, 100.0, 1e4])
 def test_a_toughness_in_another_unit_is_doubted(factor):
-    """E' G / N^2 in shear is 0.078 micrometres long, 0.0104 radii; ratios below 0.01 or above 100 are unlikely."""
+    """E' G / s^2 in shear is 0.078 micrometres long, 0.0104 radii; ratios below 0.01 or above 100 are unlikely."""
     bond = COHESIVE | {f"{mode}_toughness": factor * COHESIVE[f"{mode}_toughness"] for mode in ("normal", "tangential")}
     bond |= {f"{mode}_stiffness": 1e5 * max(1.0, 1 / factor) for mode in ("normal", "tangential")}
     case = cases.parse(case_of(coating=None).resolved() | {"interface": bond}, Path())
     lines = [line for line in warnings(case) if "fibre radii: is the unit of toughness" in line]
     ratio = factor * 2790.0 / (1 - 0.33**2) * 0.09 / 60.0**2 / 7.5
-    assert [f"long ({ratio:.2g} fibre radii" in line for line in lines] == [True] * (not 0.01 <= ratio <= 100.0)
-    assert len(lines) == (factor in (1e-3, 0.1, 1e4)) and all("the process zone is E' G / N^2 = " in n for n in lines)
+    assert [f"the strength s = 60 ({ratio:.2g} fibre radii" in line for line in lines] == [True] * (
+        not 0.01 <= ratio <= 100.0
+    )
+    assert len(lines) == (factor in (1e-3, 0.1, 1e4)) and all("the process zone is E' G / s^2 = " in n for n in lines)
 
 
 def test_a_mesh_of_ones_own_is_refined(tmp_path):

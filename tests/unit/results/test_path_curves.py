@@ -154,7 +154,11 @@ def test_the_strength_of_the_first_leg_is_the_peak_although_later_legs_strain_mo
     assert (peak["stress_name"], peak["stress"], peak["event"], peak["first_break_event"]) == ("S11", 5.0, 1, 1)
     # On the ray of point 2 at the load of the break; the second leg unloads, and is no fall.
     assert peak["stress_left"] == pytest.approx(3.0 * 0.3 / (1 / 3)) and peak["event_left"] == 2
-    assert list(largest_of_legs(path)) == [(2, 0, 3), (3, 2, 4)]
+    assert list(largest_of_legs(path)) == [(1, 0, 1), (2, 0, 3), (3, 2, 4)]
+    path["path"][4]["stress"][2] = path["path"][5]["stress"][2] = 0.5  # leg 3 unloads
+    path["path"][3]["stress"][2] = 0.75
+    assert list(largest_of_legs(path))[2] == (3, 2, 3)
+    path["path"][4]["stress"][2], path["path"][5]["stress"][2] = 2.0, 1.0
     for entry in path["path"][:3]:
         entry["broke"] = 0
     assert leading_component(path) == 2 and peak_of(path)["stress"] == 2.0

@@ -87,3 +87,6 @@ def test_the_last_closed_loop_of_friction_is_between_ends_of_legs() -> None:
         energies = unloaded | {"friction_heat": 0.25 * k, "work": 1.0 + k * k}
         point |= energies | counts | {"strain": [strain / 1000, 0.0, 0.0], "load_factor": load / 5}
     assert "Heat of friction per area (MPa): 2.5, area of the last closed loop 64" in _path_energies(document, " (MPa)")
+    for point in document["path"]:
+        point["temperature"] = 30.0 * point["load_factor"]
+    assert "Heat of friction per area (MPa): 2.5" in _path_energies(document, " (MPa)")

@@ -126,7 +126,7 @@ def test_notes_that_differ_in_numbers_alone_are_printed_once(tmp_path, monkeypat
     monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
     assert [line for line in collect.collect(tmp_path, pictures=False) if "case-000" in line] == [
         "warning: case-0001: rtol (2 cases)",
-        "remark: case-0001: [cell] order = 1: 2.6% less (2 cases)",
+        "remark: case-0001: [cell] order = 1: 2.6% less (2 cases, some with other numbers)",
         "remark: case-0001: utilisation",
     ]
 
