@@ -81,19 +81,25 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
     ignored, n_before = ("name", "petsc", skipped), stored["solver"]["ranks"]
 
     def compared(document: Mapping[str, Any], count: int) -> dict[tuple[str, ...], Any]:
-        leaves = toml_files.leaves({**document, "ranks": count})
+        leaves = toml_files.leaves(_numbered({**document, "ranks": count}))
         return {path: value for path, value in leaves if path[0] not in ignored and path not in idle}
 
     before, now = compared(stored["case"], n_before), compared(case.resolved(), ranks)
     lines = []
     for path in now | before:
-        old, new = before.get(path, "none"), now.get(path, "none")
-        if old != new:
-            lines.append(f"{wording.dotted_key(path)}: {wording.toml_value(old)} now {wording.toml_value(new)}")
+        if before.get(path) != now.get(path):
+            old, new = (wording.toml_value(of[path]) if path in of else "none" for of in (before, now))
+            lines.append(f"{wording.dotted_key(path)}: {old} now {new}")
     if n_before != ranks and len(lines) == 1:
         raise CaseError(f"--resume: {start} of a run on {n_before} ranks; go on with as many, or choose another folder")
     where = f", which differs in {', '.join(lines)}" if lines else ""
     raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
+
+
+def _numbered(value: Any) -> Any:
+    """Return nested tables with a table, by number from 1, in place of each list."""
+    entries = {str(k): entry for k, entry in enumerate(value, 1)} if isinstance(value, list) else value
+    return {name: _numbered(entry) for name, entry in entries.items()} if isinstance(entries, dict) else value
 
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:

@@ -134,7 +134,13 @@ def _material(
 ) -> EffectiveMaterial:
     """Return a material with the name, version and unit of a result; the expansion may be None."""
     case, unit = document["case"], document["case"]["output"]["stress_unit"]
+    symmetry += _bound(document)
     return EffectiveMaterial(case["name"], document["version"], unit, symmetry, compliance, expansion, errors)
+
+
+def _bound(document: Document) -> str:
+    """Return the remark that the boundary makes the result a bound, after a space; "" without it."""
+    return "".join(f" {line}." for line in document.get("remarks", ()) if line.startswith("[cell] boundary"))
 
 
 def require_done(document: Document) -> None:
@@ -226,6 +232,7 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
         text += " k22 and k33 are the mean across the fibres."
     elif couplings > NEGLIGIBLE:
         raise CaseError("its conductivity has couplings in its axes; use --transversely-isotropic")
+    text += _bound(document)
     origin = f"Effective conductivity of {name}, by feti_homog {document['version']}; nothing is converted."
     paragraphs = [origin, CONDUCTOR_AXES, text]
     if (errors := (document.get("mesh_error") or {}).get("effective_conductivity")) is not None:

@@ -107,12 +107,15 @@ def test_table_has_the_constants_of_its_stiffness():
 def test_comments_say_what_the_axes_and_units_are(form, mark):
     name = "fibres in \u00e9poxy, 55 %, " + "very " * 60
     text = FORMATS[form](
-        in_axes_of_the_cell(document(DISTINCT) | {"case": document(DISTINCT)["case"] | {"name": name}})
+        in_axes_of_the_cell(
+            document(DISTINCT)
+            | {"case": document(DISTINCT)["case"] | {"name": name}, "remarks": ["[cell] boundary: a bound", "other"]}
+        )
     )
     comments = " ".join(line.removeprefix(mark).strip() for line in text.splitlines() if line.startswith(mark))
     assert text.isascii() and max(map(len, text.splitlines())) < 256 and "\\xe9poxy" in comments
     for words in ("Axis 1 is the fibre, x3 of the cell", "axes 2 and 3 are x1 and x2", "Stresses in GPa", "per unit of",
-                  "nu_ij = -eps_j/eps_i", "Orthotropic; "):  # fmt: skip
+                  "nu_ij = -eps_j/eps_i", "Orthotropic; ", "left out. [cell] boundary: a bound."):  # fmt: skip
         assert words in comments
 
 

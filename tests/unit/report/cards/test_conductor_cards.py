@@ -56,6 +56,13 @@ def test_nearest_transversely_isotropic_conductivity_has_the_mean_across(form):
     assert (read(text, form) == np.diag([7.0, 1.5, 1.5])).all()
 
 
+@every_format
+def test_bound_is_named(form):
+    line = '[cell] boundary = "traction": the result is a lower bound of the effective one'
+    text = export.card_of(document(K, remarks=[line, "[cell] order = 1"]), form)
+    assert line in " ".join(text.replace("**", "").replace("!", "").split()) and "order = 1" not in text
+
+
 def test_noise_of_meshes_is_left_out_and_named():
     noisy = K + 1e-4 * (1 - np.eye(3))
     text = export.card_of(document(noisy, mesh_error={"effective_conductivity": (0.01 * K).tolist()}), "abaqus")
