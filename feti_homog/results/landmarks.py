@@ -70,7 +70,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     unfinished, or stopped early without a fall.
 
     On the first leg of a path of events the load only rises: where bonds break, the cell drops to the next stable
-    branch.
+    branch.  A prescribed stress cannot fall so: the peak is then one of all equilibria.
     """
     leg, breaking = path_curves.legs_of(document), path_curves.damaging_leg(document)
     points = document["path"] if breaking is None else document["path"][: np.count_nonzero(leg <= breaking)]
@@ -85,7 +85,11 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     broke = np.array([point["broke"] for point in points])
     number, curve = np.arange(len(stress)), stress  # values of the leading stress, each with its point
     by_events = document["case"]["path"]["method"] == "events"
-    if by_events and len(points) <= path_curves.first_leg(document):  # two corners of each branch, one of the first
+    strains, names = voigt.voigt_names(len(points[0]["stress"]))
+    is_given = bool(path_curves.targets(document)[0].get(names[component]))
+    if (
+        by_events and not is_given and len(points) <= path_curves.first_leg(document)
+    ):  # two corners of each branch, one of the first
         number = np.repeat(path_curves.rising_points(points), 2)[1:]
         curve = path_curves.load_controlled(points)[1:, component]
         curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)
@@ -96,7 +100,6 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     share = None if "unfinished" in document or broke[:start].any() else LEAST_FALL
     top, valley = deepest_fall(size, share, np.append(0, np.cumsum(broke))[number])
     event = int(number[size[: top + 1].argmax()])
-    strains, names = voigt.voigt_names(len(points[0]["stress"]))
     entries: dict[str, Any] = {"strain_name": strains[component], "stress_name": names[component]}
     if stresses.any():
         entries |= {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}

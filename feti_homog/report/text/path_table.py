@@ -67,7 +67,9 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         is_rising = noun == "event" and leg_of[peak["event_left"]] == 1
-        rises = f" as the {path_curves.what_rises(document)} rises" if is_rising else ""
+        is_given = path_curves.targets(document)[0].get(peak["stress_name"])
+        way = "along all equilibria" if is_given else f"as the {path_curves.what_rises(document)} rises"
+        rises = f" {way}" if is_rising else ""
         text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
     later = max(range(event, len(stresses)), key=lambda number: abs(stresses[number]))
     if later > event and abs(stresses[later]) > abs(peak["stress"]):
@@ -118,7 +120,10 @@ def _path_energies(document: Document, label: str) -> list[str]:
     The lines give the work of the loads, the energy stored at the end, the energy lost by breaks along all equilibria
     and under a rising load, frictional heat and fracture energy if any, and the debonded fraction.
     """
-    points, last = document["path"], document["path"][-1]
+    points, last = document["path"], dict(document["path"][-1])
+    size = max(abs(point["work"]) for point in points)
+    for name in {"work", "stored", "stored_in_springs", "dissipated", "friction_heat"} & last.keys():
+        last[name] = without_noise(last[name], size)
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
     lines = [f"Work per area{label}: {last['work']:.6g}", *energies(last, label)]

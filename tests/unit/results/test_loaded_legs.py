@@ -106,6 +106,17 @@ def test_the_component_of_the_leg_where_damage_begins_leads() -> None:
     assert "Largest S12 of leg 3: 60 at gamma12 = 0.03 (point 2)" in words
 
 
+def test_the_peak_under_a_prescribed_stress_is_one_of_all_equilibria() -> None:
+    """A prescribed strain drops to the next branch, whose stress rises."""
+    rows = [(0.2, 0.0, {"E11": 0.004, "S11": 18.0}, 1), (0.1, 0.0, {"E11": 0.003, "S11": 9.0}, 1),
+            (1.0, 0.0, {"E11": 0.07, "S11": 90.0}, 1)]  # fmt: skip
+    words = text(path([{"S11": 90.0}], rows))
+    assert "Peak S11: 18 at E11 = 0.004 (event 0)" in words
+    assert "; then falls by 50.0% to 9 along all equilibria (event 1); later up to 90 (event 2)" in words
+    rows[1] = (0.1, 0.0, {"E11": 0.002, "S11": 9.0}, 1)
+    assert "no peak yet: 90 at E11 = 0.07 (event 2)" in text(path([{"E11": 0.07}], rows))
+
+
 def test_paths_scale_with_the_toughness_if_all_loads_grow_together() -> None:
     document = path([{"temperature": 80.0}, {"E11": 0.02}], HEATED + TENSION)
     document["case"]["interface"] = {"criterion": "energy", "toughness": 0.01}
