@@ -28,7 +28,8 @@ OF_FIBRES = ("coating", "inner_radius")
 # Error of centres and radii in tables, relative to the radius: closer rows are one fibre, and smaller overlaps can be
 # repaired.
 SAME_FIBRE = 0.01
-SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=:]+?)(?=,?\s|,?$|;|,[a-z])")
+LENGTH = rf"([^\s;=:]+?)(?:\s*({table_columns.UNITS})\b)?"
+SIZE = re.compile(rf"\b(width|height|left|bottom)\s*[=:]\s*{LENGTH}(?=,?\s|,?$|;|,[a-z])")
 
 
 @dataclass(frozen=True)
@@ -130,10 +131,11 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
         CaseError: the table is faulty; one line per fault, with the line number in the file.
     """
     name, faults = path.name, _Faults(path.name)
-    sizes: dict[str, float] = {}
+    sizes, units = dict[str, float](), set[str]()
     lines = list[tuple[int, str]]()
     for number, contents, comment in table_columns.lines_of(path):
-        for key, word in SIZE.findall(comment):
+        for key, word, unit in SIZE.findall(comment):
+            units |= {unit} - {""}
             value = table_columns.number_of(word, ";")
             if value is None or not types.is_number(value) or (value <= 0 and key in SIZES[:2]):
                 expected = "a number above 0" if key in SIZES[:2] else "a number"
@@ -150,7 +152,9 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     head = [table_columns.cells_of(line, delimiter) for _, line in lines[:2]]
     words = head[0] if columns is None else list(columns)
     read, unread = table_columns.understood(words, COLUMNS)
-    _check_names(words, read, unread, lines[0][0], faults)
+    for row in (words, *filter(table_columns.are_units, head[1:])):
+        units |= table_columns.units_of(row, read)
+    _check_names(words, read, unread, units, lines[0][0], faults)
     faults.throw()
     rows: dict[int, dict[str, Any]] = {}
     # The first line has names, or no numbers, and units may follow.
@@ -193,9 +197,14 @@ class _Faults:
 
 
 def _check_names(
-    words: Sequence[str], read: Sequence[table_columns.SourceColumn], unread: Sequence[str], row: int, faults: _Faults
+    words: Sequence[str],
+    read: Sequence[table_columns.SourceColumn],
+    unread: Sequence[str],
+    units: set[str],
+    row: int,
+    faults: _Faults,
 ) -> None:
-    """Add faults of column names: repeated, misspelt, missing, in mixed units; CaseError if no name is known."""
+    """Add faults of column names: repeated, misspelt, missing, `units` mixed; CaseError if no name is known."""
     names = [column.name for column in read]
     if not names:
         given = wording.toml_value(", ".join(words))
@@ -207,10 +216,9 @@ def _check_names(
     for word in unread:
         if meant := table_columns.misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {wording.toml_value(word)}: unknown; did you mean {meant}?")
-    endings = (table_columns.UNIT.search(words[column.place].strip()) for column in read if column.name != "angle")
-    units = {ending[2].lower() for ending in endings if ending and ending[2]}
+    units = {re.sub("[µμ]", "u", unit.lower()) for unit in units}  # both letters stand for micro
     if len(units) > 1:
-        faults.add(row, f"columns in {' and '.join(sorted(units))}: expected one unit of length")
+        faults.add(row, f"lengths in {' and '.join(sorted(units))}: expected one unit")
     ignored = f"; not read: {', '.join(map(wording.toml_value, unread))}" if unread else ""
     # The radius, or the sizes of a shape that replace it.
     sizes = next((sizes for sizes in (("radius",), *REPLACING) if not set(names).isdisjoint(sizes)), ("radius",))

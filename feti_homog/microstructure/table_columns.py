@@ -169,6 +169,12 @@ def are_units(words: Sequence[str]) -> bool:
     return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
 
 
+def units_of(words: Sequence[str], columns: Sequence[SourceColumn]) -> set[str]:
+    """Return the units of length that names, or cells in a line of units, of columns end with."""
+    cells = (f" {words[column.place]}" for column in columns if column.name != "angle" and column.place < len(words))
+    return {ending[2] for cell in cells if (ending := UNIT.search(cell.rstrip())) and ending[2]}
+
+
 def misspelt(word: str, missing: Sequence[str]) -> str:
     """Return the column among `missing` with a name similar to `word`; "" without such a column."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)

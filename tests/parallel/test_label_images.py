@@ -49,6 +49,7 @@ def test_pixels_are_the_same_quadrilaterals_as_a_mesh(comm, shared_path, section
     result = solved(comm, path, {"pixel": 1 / 16, "boundary": boundary}, **sections)
     C, other = result.effective_stiffness, expected.effective_stiffness
     assert np.abs(C - other).max() < 1e-11 * other.max()
+    assert any("smooth = false: stepped interfaces" in remark for remark in result.remarks) == bool(sections)
     errors, others = result.mesh_error.effective_stiffness, expected.mesh_error.effective_stiffness
     assert np.abs(errors - others).max() < 1e-7 * others.max()  # whatever the pieces; fits in another order of elements
 

@@ -14,7 +14,12 @@ FAULTY_TABLES = {
     "one semi-axis": ("x,y,a\n1,2,3\n", "t.csv: row 1: column b: missing"),
     "two units": (
         "x [mm],y/mm,d (um),angle [deg]\n1,2,3,4\n",
-        "t.csv: row 1: columns in mm and um: expected one unit of length",
+        "t.csv: row 1: lengths in mm and um: expected one unit",
+    ),
+    "units below the names": (HEAD + "cm,cm,mm\n" + ROW, "t.csv: row 1: lengths in cm and mm: expected one unit"),
+    "another unit of the size": (
+        "# width = 110 mm, height = 80mm\nx (cm),y (cm),r (cm)\n" + ROW,
+        "t.csv: row 2: lengths in cm and mm: expected one unit",
     ),
     "column twice": ("x,y,radius,X\n1,2,3,4\n", "t.csv: row 1: column x: the name is there twice"),
     "too short a row": (HEAD + ROW + "1,2\n", "t.csv: row 3: has 2 columns; expected 3, one for each name"),

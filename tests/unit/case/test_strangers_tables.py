@@ -86,6 +86,12 @@ def test_excels_units_need_no_utf_8(tmp_path):
     is_expected(read_table(tmp_path / "t.csv"))
 
 
+def test_both_letters_of_micro_are_one_unit(tmp_path):
+    (tmp_path / "t.csv").write_text("# width = 7\u03bcm, height = 6 um\nx (\u00b5m),y (um),r (UM)\n2,2,1\n")
+    table = read_table(tmp_path / "t.csv")
+    assert (table.width, table.height) == (7.0, 6.0)
+
+
 @pytest.mark.parametrize("coding", ["utf-16", "utf-8-sig"])
 @pytest.mark.parametrize("writer", ["German Excel", "QuPath"])
 def test_marks_of_the_coding_are_no_part_of_a_table(tmp_path, writer, coding):
