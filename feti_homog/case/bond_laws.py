@@ -54,7 +54,7 @@ COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 TANGENTIAL = ("tangential_stiffness", "tangential_strength", "tangential_toughness")
 BRANCH = ("openings", "tractions")
 """Keys of cohesive laws: COHESIVE and OF_SOFTENING belong to all of them, BRANCH only to the law "table"."""
-OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
+OF_STRENGTHS = tuple((rf"R^\mathrm{{{name[0]}}}", name, True) for name in STRENGTHS)
 
 REGISTRY = (
     *(

@@ -77,7 +77,7 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     if points[0].get("factor") == 0.0:
         notes.append("which breaks bonds alone")
     if len(broken) < len(points):
-        notes.append(f"no onset in {len(points) - len(broken)} directions")
+        notes.append(f"directions without onset: {len(points) - len(broken)}")
     if broken:
         # The closed curve through the loads, open where directions have no onset.
         ends, mode = np.roll(places, -1, axis=0), modes(points)

@@ -41,7 +41,7 @@ def test_a_closed_curve_has_a_side_for_every_direction():
 def test_directions_without_an_onset_leave_a_gap():
     figure = envelope(document([1.0, None, 1.0, 2.0, 1.0], normal=1.0, tangential=0.5))
     assert len(curve(figure).get_segments()) == 3
-    assert "no onset in 1 directions" in figure.axes[0].get_title()
+    assert "directions without onset: 1" in figure.axes[0].get_title()
 
 
 def test_far_loads_do_not_make_the_others_small():
