@@ -34,11 +34,11 @@ def _by_phase(words: str, example: str, number: types.ValueType) -> types.ValueT
     )
 
 
-TABLE_SUFFIXES = (".csv", ".txt", ".dat")
+TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 TABLE_FILE = types.file_name("the name of a .csv file", *TABLE_SUFFIXES)
 NAMES_OF_COLUMNS = types.list_of(types.text, 'a list of names such as ["x", "y", "radius"]', least=3)
 CELL_FILE = types.file_name(
-    f"the name of a {MESH_FILE}, of a {IMAGE_FILE} of pixels, or of a .csv file of a table",
+    f"the name of a {MESH_FILE}, of a {IMAGE_FILE} of pixels, or of a table: .csv, .tsv, .txt, .dat (not .xlsx)",
     *(*MESH_SUFFIXES, *IMAGE_SUFFIXES, *TABLE_SUFFIXES),
 )
 FIBRE_LIST = types.ValueType(

@@ -64,7 +64,7 @@ def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
     assert any("mirrors the picture" in remark for remark in read.remarks()) == (writer in MIRRORED)
 
 
-@pytest.mark.parametrize("name", ["t.txt", "t.dat", "t.csv"])
+@pytest.mark.parametrize("name", ["t.txt", "t.dat", "t.csv", "t.TSV"])
 @pytest.mark.parametrize("mark", [" ", ",", ";\t"])
 def test_a_table_without_names_is_read_by_those_of_the_case(tmp_path, name, mark):
     text = SIZE + "\n".join(mark[:1].join(row) for row in (["7", "2", "2", "2"], ["8", "5", "4", "2.4"]))
