@@ -197,7 +197,8 @@ NO_REASON, THINNED = "no law", "at points whose fields are not in the files"
 # Files, and tables of result.h5, that repeat other numbers.
 COPIES = "tables for viewers and spreadsheets"
 COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "displacement_matrix", "fibre_node",
-          "matrix_node", "fibre/number", "fibre/phase")  # fmt: skip
+          "matrix_node", "fibre/number", "fibre/phase", "fibre/body", "fibre/radius", "mesh/body", "mesh/fibre_number",
+          "mesh/rank", "interface/vertex")  # fmt: skip
 
 
 class Section(dict[str, Any]):
