@@ -46,37 +46,31 @@ class DualSolution:
         return self.jump + self.compliance * self.lam
 
 
-class ActiveRows:
-    """The active rows, which carry multipliers: `mask` (owned rows,) is 1 on active rows, else 0."""
+class ActiveJumps:
+    """Projections, norms and rounding bounds of jumps on the active rows, which carry multipliers.
 
-    def __init__(self, rows: int) -> None:
-        self.mask = np.ones(rows)
+    `active` (owned rows,) is 1 on active rows, else 0.  All methods but `restrict` are collective.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace) -> None:
+        self.comm, self.operator, self.natural = comm, operator, natural
+        self.active = np.ones(len(operator.compliance))
+        self._rounding: Float | None = None
 
     def restrict(self, x: Float) -> Float:
         """Return a copy of x (owned rows,) or (owned rows, k) with 0 on the inactive rows."""
-        return distributed_arrays.scale_rows(self.mask, x)
-
-
-class ActiveJumps:
-    """Projections, norms and rounding bounds of jumps on the active rows.  All methods are collective."""
-
-    def __init__(
-        self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace, active: ActiveRows
-    ) -> None:
-        self.comm, self.operator, self.natural, self.active = comm, operator, natural, active
-        self._rounding: Float | None = None
+        return distributed_arrays.scale_rows(self.active, x)
 
     def norms(self, x: Float) -> Float:
         """Compute the Euclidean norms (k,) of the columns of x (owned rows, k)."""
-        norms: Float = np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x)))
-        return norms
+        return np.asarray(np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x))))
 
     def projected(self, x: Float) -> Float:
         """Compute P x for jumps x (owned rows, k), restricted to the active rows.
 
         P is applied twice: rounding of a single product contains rigid-body motions, which stall a Krylov method.
         """
-        return self.natural.project(self.natural.project(self.active.restrict(x)))
+        return self.natural.project(self.natural.project(self.restrict(x)))
 
     def rounding(self, displacement: Float, loads: Float, active: Float, torn: Float) -> Float:
         """Bound the rounding (k,) in jumps of the torn cell on active rows, under loads (v, k).
@@ -93,7 +87,7 @@ class ActiveJumps:
         if ((active > rounding) & (active < np.sqrt(np.finfo(float).eps) * torn)).any():
             if self._rounding is None:
                 self._rounding = jump_rounding(self.operator, displacement)
-            projected = self.natural.project(self.active.restrict(self._rounding @ loads))
+            projected = self.natural.project(self.restrict(self._rounding @ loads))
             rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(projected))
         return rounding
 
@@ -107,7 +101,7 @@ class ActiveJumps:
         """
         alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
         if self.natural.kernel_dimension:
-            alpha -= self.natural.amplitudes(self.active.restrict(jump))
+            alpha -= self.natural.amplitudes(self.restrict(jump))
             jump = jump + self.natural.G @ alpha
         # The position of a free body minimizes the jumps, so that cuts do not change the result.
         Z = self.natural.unconstrained_modes
@@ -117,7 +111,7 @@ class ActiveJumps:
             sums = distributed_arrays.allreduce_sum(self.comm, M.T @ jump)
             least = Z @ splu(squares.tocsc()).solve(sums)
             alpha, jump = alpha - least, jump - self.natural.G @ least
-        residual = self.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        residual = self.norms(self.restrict(jump)) / np.where(scale > 0, scale, 1.0)
         C = self.operator.compliance
         rows = zip(strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual, strict=True)
         return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
@@ -135,8 +129,8 @@ class ActiveJumps:
         if len(amplitudes) < len(solutions):
             return total
         alpha = np.stack(amplitudes, axis=1) @ factors
-        torn = self.natural.project(self.active.restrict(d @ strain))
-        pairs = np.stack([torn, self.active.restrict(jump)])
+        torn = self.natural.project(self.restrict(d @ strain))
+        pairs = np.stack([torn, self.restrict(jump)])
         scale, residual = np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ij,ij->i", pairs, pairs)))
         iterations, reason = max(s.iterations for s in solutions), min(s.reason for s in solutions)
         residual = float(residual / (scale or 1.0))

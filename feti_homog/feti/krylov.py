@@ -44,7 +44,7 @@ class ProjectedProblem:
         """Compute the matrix product y = P F x.  Collective."""
         with self._events[0]:
             values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
-            y.setArray(self._projected(lambda: self._jumps.active.restrict(self._jumps.operator.apply(values))))
+            y.setArray(self._projected(lambda: self._jumps.restrict(self._jumps.operator.apply(values))))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
         """Apply the preconditioner: z = P H r.  Collective."""
@@ -54,7 +54,7 @@ class ProjectedProblem:
 
     def _projected(self, vectors: Callable[[], Float]) -> Float:
         """Project the result of `vectors()` and flatten it; from the first exception on, return NaN.  Collective."""
-        nothing = np.full((len(self._jumps.active.mask), self._residual.shape[1]), np.nan)
+        nothing = np.full((len(self._jumps.active), self._residual.shape[1]), np.nan)
         return self._errors.call(lambda: self._jumps.natural.project(vectors()), nothing).ravel()
 
     def jump_norm(self) -> float:

@@ -26,7 +26,7 @@ from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.dual_solution import ActiveJumps, ActiveRows, DualSolution
+from feti_homog.feti.dual_solution import ActiveJumps, DualSolution
 from feti_homog.feti.krylov import Krylov
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
@@ -85,8 +85,7 @@ class FetiSolver:
         self.operator = DualOperator(self.interface_operators, compliance)
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
             process.trim_memory()
-        self.active = ActiveRows(self.rows)
-        self.jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
+        self.jumps = ActiveJumps(comm, self.operator, self.natural)
         self._by_columns = None
         if self.exact_inverse is not None:
             from feti_homog.feti.confirmation import InfluenceSolutions  # only influence columns need it
@@ -160,14 +159,14 @@ class FetiSolver:
         `active` (owned rows,) is 1 on rows that carry multipliers, else 0; C = `compliance` (owned rows,) is at least
         the intact compliance.  No subdomain is factored anew.  Raises like `preconditioner.soften` and `.activate`.
         """
-        changes = np.array([(active != self.active.mask).any(), (compliance != self.operator.compliance).any()])
+        changes = np.array([(active != self.jumps.active).any(), (compliance != self.operator.compliance).any()])
         self.comm.Allreduce(MPI.IN_PLACE, changes, MPI.LOR)
         rows_change, springs_change = changes
         if springs_change:
             self.preconditioner.soften(compliance - self.intact_compliance)
             self.operator.compliance = compliance
         if rows_change:
-            self.active.mask = active
+            self.jumps.active = active
             self.natural.activate(active)
         if rows_change or springs_change:
             self.preconditioner.activate(active)
@@ -244,7 +243,7 @@ class FetiSolver:
         closing = self.natural.project(closing)
         krylov.test.jump_scale = float(np.sqrt(has_jump.sum()))
         krylov.test.force_scale = float(np.linalg.norm(self.jumps.norms(closing)))
-        starts = np.where(has_jump, self.natural.project(self.active.restrict(starts)), 0.0) / scale
+        starts = np.where(has_jump, self.natural.project(self.jumps.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
         applied, iterations, reason = np.zeros_like(lam), 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if has_jump.any():

@@ -268,7 +268,7 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
     """
     unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]
-    opened = solver.natural.project(solver.active.restrict(torn))
+    opened = solver.natural.project(solver.jumps.restrict(torn))
     sizes, open_jumps = (distributed_arrays.allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
     largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))

@@ -148,13 +148,13 @@ def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
     cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
     solver, influence, E = cell.solver, cell.solver.exact_inverse, np.array([1.0, 0.2, -0.3])
     activate(cell, states(cell)[1])
-    whole = influence.multipliers(solver.d, np.eye(3)) * solver.active.mask[:, None]
+    whole = influence.multipliers(solver.d, np.eye(3)) * solver.jumps.active[:, None]
     for size, ends in ((1e-9, False), (1e-2, on_active)):
         # F lambda confirms, is spared, confirms again.
         for _ in range(2):
             solver.solve(E, np.zeros(solver.rows))
         right = influence._followed.answer
-        wrong = (solver.active.mask == on_active)[:, None] * size * right
+        wrong = (solver.jumps.active == on_active)[:, None] * size * right
         influence._followed.answer = right + wrong
         if ends:
             with pytest.raises(ConvergenceError, match="relative error"):
