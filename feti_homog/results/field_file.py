@@ -73,7 +73,7 @@ class FieldFile:
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
-        mpi_errors.on_root(comm, _with_write_errors, self.path, _create, self.part, size)
+        mpi_errors.on_root(comm, atomic.file_errors("write", self.path)(_create), self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
         # MPI-IO has short name buffers: a descriptor of the folder shortens the name.
@@ -164,7 +164,7 @@ class FieldFile:
         After a FetiHomogError on any rank, all ranks remove the file and raise.
         """
         try:
-            return agreed(self._comm, _with_write_errors, self.path, function, *args)
+            return agreed(self._comm, atomic.file_errors("write", self.path)(function), *args)
         except FetiHomogError:
             self._remove()
             raise
@@ -182,12 +182,6 @@ class FieldFile:
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 self.part.unlink()
-
-
-def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """Return function(*args).  An OSError, or RuntimeError of HDF5, becomes a FetiHomogError about `path`."""
-    with atomic.file_errors("write", path):
-        return function(*args)
 
 
 def _create(part: Path, size: int) -> None:
