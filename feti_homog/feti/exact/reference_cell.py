@@ -268,9 +268,6 @@ class BondedInverse(Preconditioner):
         """Factor the cell with all bonds intact, from dense operators; raises like `ReferenceCell`.  Collective."""
         self._cell = ReferenceCell(operators, one_sided_jumps(operators), np.ones(len(operators.springs)))
 
-    def activate(self, active: Float) -> None:
-        """Do nothing: all rows stay active."""
-
     def apply(self, r: Float) -> Float:
         """Compute H r for r (owned rows,) or (owned rows, k).  Collective."""
         return self._cell.respond(r)

@@ -42,7 +42,8 @@ class Preconditioner(Protocol):
     norm: float = np.inf
 
     def activate(self, active: Float) -> None:
-        """Restrict the preconditioner to rows where `active` (owned rows,) is 1."""
+        """Restrict the preconditioner to rows where `active` (owned rows,) is 1; by default all rows stay active."""
+        return
 
     def soften(self, more: Float) -> None:
         """Add `more` (owned rows,) to the intact spring compliance, from the next `activate` on.
@@ -60,10 +61,7 @@ class Preconditioner(Protocol):
 
 
 class Identity(Preconditioner):
-    """The identity, z = r."""
-
-    def activate(self, active: Float) -> None:
-        """Do nothing: r is 0 on inactive rows."""
+    """The identity, z = r, for any active rows: r is 0 on inactive rows."""
 
     def apply(self, r: Float) -> Float:
         """Return a copy of r."""
