@@ -114,7 +114,7 @@ class _Finder:
         self._break_names = tuple(law.break_names)[: self._unit.shape[2]]
         self._chunk = max(1, CHUNK // max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX)))
         nodes = cell.solver.jump_operator.nodes
-        self._direction, self._fibre = bond_directions(cell), cell.summary.fibre_number(nodes.fibre)
+        self._direction, self._fibre = bond_directions(cell), cell.summary.numbers[nodes.fibre]
         self._pair, self._interfaces = nodes.pair, len(context.case.interfaces)
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 

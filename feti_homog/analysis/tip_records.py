@@ -80,7 +80,7 @@ def tips(context: AnalysisContext, law: BondLaw, point: path_points.Point) -> Ti
     driving = used[node] ** 2 * law.fracture(bonds, is_tip, traction)
     mode = law.at(node).mode_angle(traction[node])
     energies = driving * np.cos(mode) ** 2, driving * np.sin(mode) ** 2
-    fibre, pair = cell.summary.fibre_number(loaded.nodes.fibre[node]), loaded.nodes.pair[node]
+    fibre, pair = cell.summary.numbers[loaded.nodes.fibre[node]], loaded.nodes.pair[node]
     local = np.column_stack([fibre, pair, bond_directions(cell)[node], *energies, np.degrees(mode)])
     table = np.concatenate(cell.comm.allgather(local))
     fibre, pair, direction, *_ = table.T
@@ -101,7 +101,7 @@ def most_utilised_bond(context: AnalysisContext, law: BondLaw, point: path_point
     used = np.where(point.used > law.share(np.stack(sizes, axis=1)), point.used, 0.0)
     largest = cell.comm.allreduce(used.max(initial=0.0), MPI.MAX)
     rows = np.flatnonzero((used > 0.0) & (used >= largest * (1.0 - UTILISATION_TIE)))
-    fibre = cell.summary.fibre_number(context.loads.interfaces.nodes.fibre[rows])
+    fibre = cell.summary.numbers[context.loads.interfaces.nodes.fibre[rows]]
     table = np.concatenate(cell.comm.allgather(np.column_stack([fibre, bond_directions(cell)[rows]])))
     order = np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 0]))
     return tuple(table[order[0]].tolist()) if len(table) else (np.nan, np.nan)

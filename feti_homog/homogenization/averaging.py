@@ -256,7 +256,7 @@ class FibreInterfaces:
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._numbers = cell.summary.numbers
-        self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
+        self._fibre = self._numbers[self._nodes.fibre] - 1
         self._length = self.length(np.ones(len(self._fibre), bool))
         of_coating = self.length(~cell.summary.is_fibre[self._nodes.fibre])
         radius = np.where(of_coating > 0, np.nan, cell.summary.radii[cell.summary.fibre_bodies])

@@ -93,10 +93,6 @@ class CellSummary:
         """Whether fibres have shapes other than circles and ellipses."""
         return bool(np.isnan(self.frames[self.fibre_bodies]).any())
 
-    def fibre_number(self, constituent: Int) -> Int:
-        """Return the fibre numbers (k,) of the constituents with indices (k,)."""
-        return np.asarray(self.numbers[constituent])
-
     def warnings(self) -> list[str]:
         """List a warning if a user's mesh was moved by more than rounding errors."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"

@@ -100,7 +100,7 @@ class TipZones:
         self.points, self.bodies = self.gathered(nodes.points), self.gathered(nodes.bodies)
         self.pair, inner = self.gathered(nodes.pair), self.bodies[:, 1]
         self.spokes = nearest_image(self.points - cell.summary.centres[inner], self.period)
-        self.fibre, self.radius = cell.summary.fibre_number(inner), cell.summary.radii[inner]
+        self.fibre, self.radius = cell.summary.numbers[inner], cell.summary.radii[inner]
         # Rounding errors must not decide the order of directions.
         direction = np.round(self.gathered(cell.directions), debonded_arcs.DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self.gathered(nodes.length)

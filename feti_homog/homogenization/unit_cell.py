@@ -143,7 +143,7 @@ class TornCell:
 
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
-        factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
+        factor = self.strength_factors[self.summary.numbers[nodes.fibre] - 1] if varies else 1.0
         return law_of_sections(self.case.interfaces, nodes.pair, factor)
 
     @cached_property
@@ -163,7 +163,7 @@ class TornCell:
     def debonded(self, opening: float | None) -> Bool:
         """Return the mask (k,) of this rank's initially debonded nodes; arcs without angle have `opening` degrees."""
         nodes = self.solver.jump_operator.nodes
-        number = self.summary.fibre_number(nodes.fibre)
+        number = self.summary.numbers[nodes.fibre]
         is_debonded = nodes.precracked & bool(self.case.interfaces)
         if self.case.arcs:
             from feti_homog.interface import debonded_arcs  # few cells have arcs

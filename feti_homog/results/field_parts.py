@@ -57,7 +57,7 @@ def fibre_part(cell: unit_cell.TornCell) -> FibrePart:
     summary = cell.summary
     body = summary.fibre_bodies if cell.comm.rank == 0 else summary.fibre_bodies[:0]
     return FibrePart(
-        number=summary.fibre_number(body),
+        number=summary.numbers[body],
         body=body,
         phase=summary.constituent_phase[body],
         centre=summary.centres[body] + summary.origin,
@@ -76,7 +76,7 @@ def interface_part(cell: unit_cell.TornCell) -> InterfacePart:
         normal=nodes.normal,
         length=nodes.length,
         fibre=nodes.fibre,
-        fibre_number=cell.summary.fibre_number(nodes.fibre),
+        fibre_number=cell.summary.numbers[nodes.fibre],
         pair=nodes.pair,
         fibre_node=numbers[nodes.fibre_node],
         vertex=(cell.comm.exscan(len(nodes.row)) or 0) + np.arange(len(nodes.row))[:, None],

@@ -40,7 +40,7 @@ def torn(case, comm):
     """Return the torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
     PETSc.garbage_cleanup(comm)
     cell = tear(case, comm, Progress(comm, quiet=True))
-    number = cell.summary.fibre_number(cell.solver.jump_operator.nodes.fibre)
+    number = cell.summary.numbers[cell.solver.jump_operator.nodes.fibre]
 
     def nodes(opening=None):
         parts = comm.allgather((number, cell.directions, cell.debonded(opening)))
