@@ -152,7 +152,7 @@ class AnalysisContext:
 
     def bonds(self, opening: float | None) -> BondState:
         """Return the initial bond state.  Debonded arcs without an angle of their own open by `opening` degrees."""
-        return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, BONDED).astype(np.int8))
+        return replace(self.plane.intact, status=np.where(self.cell.debonded(opening), OPEN, BONDED).astype(np.int8))
 
     def response_errors(
         self, groups: Sequence[Sequence[averaging.Response]]

@@ -184,7 +184,7 @@ class ContactProblem:
             closed = np.where(bonds.status == OPEN, CLOSED, bonds.status).astype(np.int8)
             if not self.contact or not self._any(closed != bonds.status):
                 raise
-        return self._search(load, bonds.with_status(closed), start)
+        return self._search(load, replace(bonds, status=closed), start)
 
     def _search(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Flip wrong statuses until no node violates the KKT conditions.  Collective; raises like `equilibrium`.
@@ -276,7 +276,7 @@ class ContactProblem:
             after, squares = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (motions, before))
             freed = np.isin(coarse.body, coarse.body[after - squares > NEGLIGIBLE])
             idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
-            bonds = bonds.with_status(np.where(idle, OPEN, status).astype(np.int8))
+            bonds = replace(bonds, status=np.where(idle, OPEN, status).astype(np.int8))
             if self._any(idle):
                 # The search left the fibre at one of many admissible positions.
                 self.prepare(bonds)

@@ -55,10 +55,6 @@ class BondState:
         """The signs `sliding` (k,), 0 without friction."""
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
-    def with_status(self, status: Status) -> BondState:
-        """Return the bonds with new statuses (k,)."""
-        return replace(self, status=status)
-
     def flipped(self, which: Bool) -> BondState:
         """Return the bonds with the opposite contact state at the nodes in the mask `which` (k,).
 
