@@ -5,8 +5,8 @@ Imports nothing.  Main entries: `convex_sums.Outlines`, `shapes.SHAPES`.
 
 from typing import TYPE_CHECKING
 
-from feti_homog.microstructure.shapes.ellipses import Conics, Discs, Ellipses, gaps
-from feti_homog.microstructure.shapes.outlines import directions, on_circle
+from feti_homog.microstructure.shapes.ellipses import Conics, Discs, Ellipses
+from feti_homog.microstructure.shapes.outlines import directions, gaps, on_circle
 
 __all__ = ["Conics", "Discs", "Ellipses", "Outlines", "convex_sums", "directions", "gaps", "on_circle", "shapes"]
 

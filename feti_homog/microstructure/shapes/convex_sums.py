@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -9,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
-from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
+from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions
 from feti_homog.typing import Bool, Float, Int
 
 # Points that represent an outline for distances, curvatures and lengths.
@@ -44,12 +45,6 @@ class ConvexSums(ConvexCurves):
         core = np.linalg.norm(self.cores, axis=2).max(axis=1)
         return np.asarray(core + np.linalg.norm(self.frames, axis=1).max(axis=1))
 
-    @property
-    def extents(self) -> Float:
-        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
-        axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
-        return self.support(axes).reshape(-1, 2, 2)
-
     def grown(self, thickness: Float) -> ConvexSums:
         """Return the outlines enlarged by rings of `thickness` (k,), with rounded corners."""
         frames, some = self.frames.copy(), thickness > 0
@@ -61,23 +56,9 @@ class ConvexSums(ConvexCurves):
 
     def support(self, normal: Float) -> Float:
         """Return the supports (k, ...) at unit vectors n (k, ..., 2): max_v v . n + |F^T n| over corners v of V."""
-        core = np.einsum("kmi,k...i->k...m", self.cores, normal).max(axis=-1)
-        return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
-
-    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs: maximise v . n - h_1(n) - h_2(-n) for the supports h.
-
-        `vector` v (p, 2) goes from the first centres to the second.  Returns the normals n (p, 2), and the sums r (p,)
-        of both supports along n: the gap n . v - r is negative for an overlap.
-        """
-        one, other = self[first], self[second]
-
-        def gap(angle: Float) -> Float:
-            n = directions(angle)
-            return np.asarray(np.einsum("ki,kmi->km", vector, n) - one.support(n) - other.support(-n))
-
-        normal = directions(widest(vector, gap)[1])
-        return normal, one.support(normal) + other.support(-normal)
+        flat = normal.reshape(len(normal), math.prod(normal.shape[1:-1]), 2)
+        core, turned = (flat @ self.cores.transpose(0, 2, 1)).max(axis=2), flat @ self.frames
+        return np.asarray((core + np.sqrt(np.einsum("kmi,kmi->km", turned, turned))).reshape(normal.shape[:-1]))
 
     def distances(self, offsets: Float) -> Float:
         """Return distances (n, k) from about POINTS outline points to points at `offsets` (n, k, 2) from centres."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, on_circle, widest
+from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, on_circle
 from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squared semi-axes, up to which an ellipse is a circle.
@@ -49,11 +50,6 @@ class Ellipses(ConvexCurves):
     def radii(self) -> Float:
         """The radii (k,) of equal-area discs."""
         return np.asarray(np.sqrt(np.abs(np.linalg.det(self.frames))))
-
-    @property
-    def extents(self) -> Float:
-        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
-        return np.repeat(np.linalg.norm(self.frames, axis=2)[:, :, None], 2, axis=2)
 
     def grown(self, thickness: Float) -> Ellipses:
         """Return the ellipses with both semi-axes longer by `thickness` (k,); the columns of F must be semi-axes."""
@@ -125,13 +121,8 @@ class Ellipses(ConvexCurves):
 
     def support(self, normal: Float) -> Float:
         """Return the support functions |F^T n| (k, ...) at unit vectors n (k, ..., 2)."""
-        return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
-
-    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Find the directions that best separate pairs, and the sums of both supports; see `ConvexSums.parting`."""
-        one, other = self[first], self[second]
-        normal = directions(gaps(one, other.at(one.centres + vector))[1])
-        return normal, one.support(normal) + other.support(normal)
+        turned = normal.reshape(len(normal), math.prod(normal.shape[1:-1]), 2) @ self.frames
+        return np.asarray(np.sqrt(np.einsum("kmi,kmi->km", turned, turned)).reshape(normal.shape[:-1]))
 
     def distances(self, offsets: Float) -> Float:
         """Return distances (n, k) of points at d (n, k, 2) from the centres, about ||F^-1 d| - 1| sqrt|det F|."""
@@ -151,22 +142,6 @@ class Ellipses(ConvexCurves):
         """Return the outward unit normals (k, 2) at the parameters t (k,) of `points`."""
         across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
-
-
-def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
-    """Return the gaps (k,) between pairs of ellipses, and the gap directions (k,) in radians.
-
-    The gap is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance, or minus the penetration depth.
-    """
-    vector = second.centres - first.centres
-    one, other = first.squares, second.squares
-
-    def gap(angle: Float) -> Float:
-        n = directions(angle)
-        reach = [np.sqrt(np.einsum("kmi,kij,kmj->km", n, squares, n)) for squares in (one, other)]
-        return np.asarray(np.einsum("ki,kmi->km", vector, n) - reach[0] - reach[1])
-
-    return widest(vector, gap)
 
 
 class EllipticRows:
@@ -219,11 +194,6 @@ class Discs(ConvexCurves):
         """The radii (k,), as bounds on the distances from the centres to the points."""
         return self.radii
 
-    @property
-    def extents(self) -> Float:
-        """The extents (k, 2, 2) from the centres along both axes: the radii."""
-        return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
-
     def grown(self, thickness: Float) -> Discs:
         """Return the discs enlarged by rings of thickness (k,)."""
         return replace(self, radii=self.radii + thickness)
@@ -254,7 +224,7 @@ class Discs(ConvexCurves):
         return np.broadcast_to(radii, normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return directions between centres, or x if centres coincide, and radius sums; see `ConvexSums.parting`."""
+        """Return directions between centres, or x if centres coincide, and radius sums; see `ConvexCurves.parting`."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]

@@ -1,5 +1,6 @@
 """Define the base class of fibre outlines and the ranges of table columns; find the widest gap between curves."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, Self
@@ -16,10 +17,10 @@ Columns = Mapping[str, Float]
 
 
 @dataclass(frozen=True)
-class ConvexCurves:
+class ConvexCurves(ABC):
     """The common base of all outlines: k closed convex curves c + V + F D with the unit disc D.
 
-    Derived classes have the methods `grown`, `support`, `parting` and `distances`, and these fields or properties:
+    Derived classes have the methods `grown`, `support` and `distances`, and these fields or properties:
 
     Attributes:
         centres: (k, 2) centres c.
@@ -27,7 +28,6 @@ class ConvexCurves:
         frames: (k, 2, 2) frames F.
         radii: (k,) radii of equal-area discs.
         longest: (k,) upper bounds on the distances from the centres to the points of the curves.
-        extents: (k, 2, 2) extents from the centre along the two axes, backwards and forwards.
     """
 
     centres: Float
@@ -58,6 +58,26 @@ class ConvexCurves:
         """Return these curves followed by `others`.  The cores of all curves must have equally many corners."""
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
+    @abstractmethod
+    def support(self, normal: Float) -> Float:
+        """Return the supports max_x n . (x - c) (k, ...) of the curves at unit vectors n (k, ..., 2)."""
+
+    @property
+    def extents(self) -> Float:
+        """The extents (k, 2, 2) from the centres along both axes, backwards and forwards."""
+        axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
+        return self.support(axes).reshape(-1, 2, 2)
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """Find the directions that best separate pairs: maximise v . n - h_1(n) - h_2(-n) for the supports h.
+
+        `vector` v (p, 2) goes from the first centres to the second.  Returns the normals n (p, 2), and the sums r (p,)
+        of both supports along n: the gap n . v - r is negative for an overlap.
+        """
+        one, other = self[first].at(np.zeros_like(vector)), self[second].at(vector)
+        normal = directions(gaps(one, other)[1])
+        return normal, one.support(normal) + other.support(-normal)
+
     def _each(self, function: Callable[..., Float], *others: "ConvexCurves") -> Self:
         """Apply a function, field by field, to this object and other curves; return the new curves."""
         curves = (self, *others)
@@ -83,13 +103,17 @@ def on_circle(circles: Float, angle: Float) -> Float:
     return np.asarray(circles[..., :2] + circles[..., 2:] * directions(angle))
 
 
-def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
-    """Find the direction of the largest gap between k pairs of curves.
+def gaps(first: ConvexCurves, second: ConvexCurves) -> tuple[Float, Float]:
+    """Return the gaps (k,) between pairs of curves, and the gap directions (k,) in radians.
 
-    `vector` (k, 2) goes from the first centres to the second; gap(a) returns the gaps across directions a (k, m).
-    Returns the gaps (k,) and directions (k,) in radians.
+    The gap is max_n (c_2 - c_1) . n - h_1(n) - h_2(-n), h the supports: the distance, or minus the penetration depth.
     """
-    step = 2 * np.pi / DIRECTIONS
+    vector, step = second.centres - first.centres, 2 * np.pi / DIRECTIONS
+
+    def gap(angle: Float) -> Float:
+        n = directions(angle)
+        return np.asarray(np.einsum("ki,kmi->km", vector, n) - first.support(n) - second.support(-n))
+
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
     best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
     for _ in range(ZOOMS):

@@ -9,7 +9,8 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.arrangements import neighbours
 from feti_homog.microstructure.cut_window import LEAST_GAP, MOST_GAP, moves
-from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, gaps
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
+from feti_homog.microstructure.shapes.outlines import gaps
 
 SIZE = np.array([1.0, 1.0])
 

@@ -16,7 +16,8 @@ from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.microstructure.fibre_table import table_of
-from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
+from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes.outlines import gaps
 
 ROWS = [
     {"x": 0.5, "y": 0.5, "a": 0.25, "b": 0.1, "angle": 30.0},
