@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from feti_homog.feti import thresholds
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
-from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps, stiffness_of_rows
+from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps
 from feti_homog.feti.exact.reference_changes import ReferenceChanges
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.preconditioners import Preconditioner
@@ -53,7 +53,9 @@ class ExactInverse(Preconditioner):
         self._first, end = jump_operator.owned
         self._rows = end - self._first
         self._no_answer = np.zeros((self._rows, 0))
-        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
+        # The stiffness 1 / diag(B D^-1 B^T + C) of every row, with the diagonal D of K and the springs C.
+        flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
+        self.stiffness = np.concatenate(comm.allgather(1.0 / (flexibility + operators.springs)))
         # K <= n diag(K) for the n displacements of an element; tests measure the bound where bodies meet.
         displacements = max((s.mesh.triangles.shape[1] * s.problem.components for s in operators.subdomains), default=0)
         self.norm = max(comm.allgather(displacements)) * self.stiffness.max(initial=0.0)

@@ -247,15 +247,6 @@ def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)
 
 
-def stiffness_of_rows(operators: InterfaceOperators) -> Float:
-    """Compute the stiffness 1 / diag(B D^-1 B^T + C) (owned rows,) of every row.  Collective.
-
-    D is the diagonal of K, C the compliance of the springs.
-    """
-    flexibility = operators.jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
-    return np.asarray(1.0 / (flexibility + operators.springs))
-
-
 class BondedInverse(Preconditioner):
     """The preconditioner z = H r, with the inverse H of the dual operator from a factored cell with all rows active.
 
