@@ -36,11 +36,6 @@ class _Rows:
     count: int
     total: int
 
-    @classmethod
-    def of(cls, comm: Comm, count: int) -> _Rows:
-        counts = comm.allgather(count)
-        return cls(sum(counts[: comm.rank]), count, sum(counts))
-
 
 class FieldFile:
     """The unfinished file `directory`/result.h5; every method is collective over `comm`.
@@ -70,7 +65,8 @@ class FieldFile:
         file_locks.files.add(self.part)
         self._units = {records.LENGTH: header.length_unit, records.STRESS: header.stress_unit}
         counts = {"n": len(mesh.points), "m": len(mesh.triangles), "k": len(interface.points), "f": len(fibres.number)}
-        self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
+        of_ranks = {symbol: comm.allgather(count) for symbol, count in counts.items()}
+        self._rows = {symbol: _Rows(sum(n[: comm.rank]), n[comm.rank], sum(n)) for symbol, n in of_ranks.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
         mpi_errors.on_root(comm, atomic.file_errors("write", self.path)(_create), self.part, size)
@@ -84,7 +80,7 @@ class FieldFile:
             mpi_errors.agree_after, lambda: self._opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
         )
         attributes = field_layout.attributes(header) | {"created_by": field_layout.PROGRAM}
-        self._agreed(mpi_errors.agree_after, _set_attributes, self._file, "/", attributes)
+        self._agreed(mpi_errors.agree_after, self._file.attrs.update, attributes)
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
         self._write_part("interface", interface)
@@ -93,7 +89,8 @@ class FieldFile:
         """Write state `number` (0, 1, ...) and flush the file.  Attributes must be equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
-        self._agreed(mpi_errors.agree_after, _set_attributes, self._file, group, field_layout.attributes(state))
+        attributes = field_layout.attributes(state)
+        self._agreed(mpi_errors.agree_after, lambda: self._file[group].attrs.update(attributes))
         self._agreed(mpi_errors.agree_after, self._file.flush)
 
     def close(self) -> Path:
@@ -203,10 +200,6 @@ def _create(part: Path, size: int) -> None:
         raise
 
 
-def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None:
-    file[name].attrs.update(attributes)
-
-
 def _reserve(part: Path, start: int, size: int) -> None:
     """Reserve `size` bytes of a file from `start` on: without space, MPI-IO may wait forever.  Raises OSError."""
     with part.open("r+b") as stream:
@@ -216,7 +209,7 @@ def _reserve(part: Path, start: int, size: int) -> None:
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: Mapping[str, str]) -> None:
     """Create the table `name`, and write this rank's rows; a rank without rows takes part.  Collective."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
-    _set_attributes(file, name, texts)
+    table.attrs.update(texts)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
     if rows.count:
         place.select_hyperslab((rows.start,) + (0,) * (array.ndim - 1), array.shape)
