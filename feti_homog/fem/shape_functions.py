@@ -21,6 +21,8 @@ from feti_homog.typing import Float
 # area of straight elements exactly, also with a bubble, and curved elements with the full order.
 _C = np.array([0.445948490915965, 0.091576213509771])
 _P2_POINTS = np.stack([np.r_[1 - 2 * _C, _C, _C], np.r_[_C, 1 - 2 * _C, _C]], axis=1)
+# The barycentric coordinates (6, 3) of its points.
+BARYCENTRIC: Float = np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 BUBBLE = 6
 # Second derivatives (6, 3) of the shape functions with respect to the reference coordinates: 11, 22 and 12.
@@ -61,17 +63,8 @@ def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
     return np.stack([by_x, by_y], axis=3) / determinant[..., None, None], determinant * weights
 
 
-def barycentric(nodes: int) -> Float:
-    """Return the barycentric coordinates (q, 3) of the quadrature points in a triangle with 3 or 6 nodes."""
-    if nodes == 3:
-        return np.full((1, 3), 1 / 3)
-    return np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])
-
-
-def shape_functions(nodes: int, lam: Float) -> Float:
-    """Evaluate the 3 or 6 shape functions (q, nodes) at barycentric coordinates lam (q, 3)."""
-    if nodes == 3:
-        return lam
+def shape_functions(lam: Float) -> Float:
+    """Evaluate the shape functions (q, 6) of quadratic triangles at barycentric coordinates lam (q, 3)."""
     return np.hstack([lam * (2 * lam - 1), 4 * lam * np.roll(lam, -1, axis=1)])
 
 
@@ -124,7 +117,7 @@ class MixedElements:
     def of(cls, points: Float, L: Float) -> MixedElements:
         """Compute gradients, weights and projections of mixed elements with nodes (e, 6, 2) and stiffness L (v, v)."""
         g, w = gradients(points, with_bubble=True)
-        linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
+        linear, (e, q, a, _) = BARYCENTRIC, g.shape
         mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
         moments = (linear.T * w[:, None]) @ g.reshape(e, q, 2 * a)
         return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))

@@ -16,7 +16,7 @@ import numpy as np
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
-from feti_homog.fem.shape_functions import MixedElements, barycentric, gradients, shape_functions, slopes, strains
+from feti_homog.fem.shape_functions import BARYCENTRIC, MixedElements, gradients, shape_functions, slopes, strains
 from feti_homog.mesh import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
@@ -120,7 +120,7 @@ class RecoveredStress:
         else:
             g, weights = gradients(corners)
             stress = self.L[:m, :m] @ strains(slopes(g, u), self.problem)
-        points = shape_functions(6, barycentric(6)) @ corners
+        points = shape_functions(BARYCENTRIC) @ corners
         return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
@@ -186,7 +186,7 @@ class RecoveredStress:
         if self.order == 1:
             return np.asarray((lam @ self.fits[:, 0][vertices]).reshape(len(vertices), len(lam), *shape))
         corners = self.points[self.triangles[part]]
-        points, result = shape_functions(6, lam) @ corners, np.zeros(())
+        points, result = shape_functions(lam) @ corners, np.zeros(())
         for k in range(3):
             basis = polynomials(points - corners[:, None, k], self.order)
             result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
@@ -204,7 +204,7 @@ class RecoveredStress:
         for chunk in self.elements:
             # Differences (q, e, m, k) at points in the elements, times the roots of the weights.
             if self.order == 2:
-                difference = self.recovered(chunk.part, barycentric(6)) - chunk.stress
+                difference = self.recovered(chunk.part, BARYCENTRIC) - chunk.stress
                 difference = (difference * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1)
             else:
                 # With the values d_i of the linear difference d at the vertices, and their sum s:

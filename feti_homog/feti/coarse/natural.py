@@ -133,8 +133,7 @@ class NaturalCoarseSpace:
             return x.copy()
         if not self._is_factored:
             self.factor()
-        projected: Float = x - self._G @ self.solver.solve(self._GT @ x)
-        return projected
+        return np.asarray(x - self._G @ self.solver.solve(self._GT @ x))
 
     def destroy(self) -> None:
         """Free the factor of G^T G.  Collective."""
