@@ -36,7 +36,8 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
     inverses = [inverse for inverse in exact_inverses if inverse is not None]
     if len(inverses) < len(cell.problems):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    return energy.ReleasedEnergy.of(law, *inverses)
+    influence, *axial = inverses
+    return energy.ReleasedEnergy(**vars(law), influence=influence, axial=next(iter(axial), None))
 
 
 def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:

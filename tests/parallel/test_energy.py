@@ -37,7 +37,7 @@ ONSET_STRAIN, ONSET_STRESS = GLASS_EPOXY_ONSET.value
 def criterion(cell, growth):
     if growth == "springs":
         return SPRINGS
-    return ReleasedEnergy.of(SPRINGS, cell.solver.exact_inverse)
+    return ReleasedEnergy(**vars(SPRINGS), influence=cell.solver.exact_inverse)
 
 
 def path(comm, growth, strain, **case):

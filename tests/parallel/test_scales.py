@@ -200,7 +200,8 @@ def softly_held(comm, stiffness, young, count, **cell):
     loaded = CoupledInterfaces(torn_cells.interface(cell, False))
     springs = SpringEnergy(stiffness, RATIO * stiffness, TOUGHNESS * stiffness, SENSITIVITY)
     begin = unloaded(loaded, torn_cells.bonds(np.full(len(loaded.nodes.row), BONDED, np.int8)))
-    points = events(loaded, ReleasedEnergy.of(springs, cell.solver.exact_inverse), strains(STRAIN[None]), begin)
+    law = ReleasedEnergy(**vars(springs), influence=cell.solver.exact_inverse)
+    points = events(loaded, law, strains(STRAIN[None]), begin)
     return np.array([point.load_factor for point, _ in zip(points, range(count), strict=False)]), cell
 
 

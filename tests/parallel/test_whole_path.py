@@ -73,7 +73,7 @@ def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
 def follow(cell, growth, begin=None):
     """Return the points of the path, or of what is left of it."""
     interface, springs = torn_cells.interface(cell, True), SpringEnergy(*SPRINGS, TOUGHNESS, SENSITIVITY)
-    law = ReleasedEnergy.of(springs, cell.solver.exact_inverse) if growth == "released" else springs
+    law = ReleasedEnergy(**vars(springs), influence=cell.solver.exact_inverse) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     return list(
         events(

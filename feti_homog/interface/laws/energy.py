@@ -116,16 +116,6 @@ class ReleasedEnergy(SpringEnergy):
     influence: exact_inverse.ExactInverse
     axial: exact_inverse.ExactInverse | None = None
 
-    @classmethod
-    def of(
-        cls,
-        springs: SpringEnergy,
-        influence: exact_inverse.ExactInverse,
-        axial: exact_inverse.ExactInverse | None = None,
-    ) -> Self:
-        """Make the law from a spring law and the inverse dual operators; `axial` is None without an axial problem."""
-        return cls(**vars(springs), influence=influence, axial=axial)
-
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
         """Return the law at this rank's nodes in a bond state.  Collective; methods of the returned law are not.
 
