@@ -83,7 +83,7 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
     shared, n = local[is_shared_row], local.shape[1]
     used, indices = np.unique(shared.indices, return_inverse=True)
     narrow = csr_matrix((shared.data, indices, shared.indptr), shape=(shared.shape[0], len(used)))
-    A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, _even_share(comm, n)))
+    A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, PETSc.Sys.splitOwnership(n, comm=comm)[0]))
     # Descending order, because PETSc 3.18 mixes up the columns if every rank requests all rows in ascending order.
     asked_rows = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
@@ -102,7 +102,7 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, to
 
     Rows and columns of `part` have the global `numbers` (k,); the rows of the sum are evenly distributed.
     """
-    share = _even_share(comm, total)
+    share = PETSc.Sys.splitOwnership(total, comm=comm)[0]
     return _assemble(comm, part, numbers, numbers, (share, share))
 
 
@@ -118,11 +118,6 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
     lengths = distributed_arrays.allgather_rows(comm, np.diff(indptr), counts)
     indices, values = (distributed_arrays.allgather_rows(comm, x, entries) for x in (columns, data))
     return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
-
-
-def _even_share(comm: MPI.Intracomm, n: int) -> int:
-    """Return the number of rows of this rank in an even distribution of n rows."""
-    return n // comm.size + (1 if comm.rank < n % comm.size else 0)
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
