@@ -11,10 +11,10 @@ from typing import Any
 
 from feti_homog.case import bond_laws, cell_sizes, sections
 from feti_homog.case.cell_section import GEOMETRY, Cell
-from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
+from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, labelled
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import provider, read_materials, unlike_units
-from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
+from feti_homog.case.relations import axes_lines, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES, Rule
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.toml_files import is_key, leaves, read_document, short_digest, to_document, with_values
@@ -158,7 +158,9 @@ class Case:
             high = {name: value for name, value in given.items() if least < value < float("inf")}
             question = f"above {least:g}, the stiffness of a phase: are both in one unit?"
             units += [f"[{section}] {name} = {value:g}: {question}" for name, value in high.items()]
-        return (*of_elements, *contrast, *units, *idle_friction_keys(self.interfaces))
+        idle = [label for label, each in labelled(self.interfaces) if each.friction_on_damage and each.friction == 0.0]
+        frictionless = (f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle)
+        return (*of_elements, *contrast, *units, *frictionless)
 
     def remarks(self) -> tuple[str, ...]:
         """List remarks on assumed and on doubtful settings, one per line."""

@@ -186,12 +186,6 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
         yield f'{words} growth = "released"; growth = "springs" goes with it'
 
 
-def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """List the interfaces with friction_on_damage = true but zero friction, one line each."""
-    idle = [label for label, each in labelled(interfaces) if each.friction_on_damage and each.friction == 0.0]
-    return [f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle]
-
-
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
     """Yield the faults of a softening branch, and numbers that contradict the branch."""
     openings, tractions = interface.openings, interface.tractions
