@@ -170,8 +170,7 @@ class Result:
     @property
     def document(self) -> dict[str, Any]:
         """Return the content of result.json in the order of the file, with NumPy arrays."""
-        document: dict[str, Any] = records.plain(self)
-        return document
+        return dict(records.plain(self))
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
