@@ -31,9 +31,7 @@ def report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     directory = output_folder.result_folder(arguments.directory)
     mpi_errors.on_root_only(comm, stored_result.read, directory)
-    path = mpi_errors.on_root_only(comm, page.write, directory)
-    if path is not None:
-        standard_streams.say(str(path))
+    mpi_errors.on_root_only(comm, lambda: standard_streams.say(str(page.write(directory))))
 
 
 def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
