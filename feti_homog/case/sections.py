@@ -70,7 +70,8 @@ class SweepSection:
     seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
         types.integer(least=1, most=types.MOST_ROWS),
-        "Random arrangements at each point, with seeds that count up from [cell] seed; or give a list of cell.seed.",
+        "Random cells, or strengths that scatter, at each point, with seeds of [cell] and of scatter that count up; or "
+        "give lists of cell.seed.",
         default=None,
     )
 

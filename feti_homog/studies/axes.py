@@ -143,6 +143,11 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
     return "" if is_sampled else f"expected {sections.AXIS_EXPECTED}"
 
 
+def is_seed(name: str) -> bool:
+    """Return whether an input, such as `interface.scatter.seed`, selects a realisation."""
+    return name.endswith(".seed")
+
+
 def rounded(value: float) -> float:
     """Round a number to DIGITS significant digits."""
     return float(f"{value:.{DIGITS}g}")

@@ -13,6 +13,7 @@ import numpy as np
 from feti_homog.report.text import constant_tables, point_tables, tables
 from feti_homog.results import atomic, result_json
 from feti_homog.studies import case_folders
+from feti_homog.studies.axes import is_seed
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.predictions import responses
 from feti_homog.studies.sweep_table import PARTS, SweepTable
@@ -94,7 +95,7 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
     for row, _ in enumerate(table.folder):
         progress = [getattr(table, name)[row] for name in CASE]
         cases.append([row + 1, *progress, *(values[row] for values in columns)])
-    inputs = [name for name in table.inputs if name != "cell.seed"]
+    inputs = [name for name in table.inputs if not is_seed(name)]
     statistics: list[list[Any]] = [["point", *inputs, "output", "unit", *PARTS]]
     for number, point in enumerate(table.points):
         at_point = [point, *(table.input_of(point, name) for name in inputs)]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import Case, cases, sections, toml_files
+from feti_homog.case import Case, cases, interface_section, sections, toml_files
 from feti_homog.errors import CaseError
 from feti_homog.report.text import tables
 from feti_homog.schema import wording
-from feti_homog.studies.axes import Assignment, read_points
+from feti_homog.studies.axes import Assignment, is_seed, read_points
 from feti_homog.system.petsc import option_table
 
 MAX_NAMED_CASES = 4  # cases that one fault names
@@ -151,38 +151,46 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Construct sweep cases and their unchecked documents; [] after faults, which add lines to `faults`.
 
-    The cases run through all points; further `realisations`, if not None, follow at points with a random cell, whose
-    seeds count up.  Points whose inputs differ only in `cell.seed` become realisations of one point.
+    The cases run through all points; further `realisations`, if not None, follow at points with a random cell or with
+    strengths that scatter, whose seeds count up.  Points that differ only in seeds become realisations of one point.
     """
     documents = [toml_files.with_values(base, point, faults, f"[{section}] ") for point in points]
-    if realisations is not None and documents and not any(map(_is_random, documents)):
-        faults.append(f'[{sections.SWEEP}] realisations: only cells with geometry = "random" have several')
+    seeds = [{} if realisations is None else _seeds(document) for document in documents]
+    if realisations is not None and documents and not any(seeds):
+        faults.append(f"[{sections.SWEEP}] realisations: only random cells and strengths that scatter have several")
     keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
-    if realisations is not None and "cell.seed" in keys:
-        faults.append(f"[{sections.SWEEP}] realisations: excludes cell.seed; seeds count up from the seed in [cell]")
+    for key in filter(is_seed, keys if realisations is not None else ()):
+        faults.append(f"[{sections.SWEEP}] realisations: excludes {key}; seeds count up from the seed of the case")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
     ordered, numbers, counts = list[tuple[SweepCase, dict[str, Any]]](), dict[int | str, int](), Counter[int]()
     for realisation in range(1, (realisations or 1) + 1) if not faults else ():
         for place, (point, document) in enumerate(zip(points, documents, strict=True)):
             inputs, varied = _inputs(point), document
             group: int | str = place
-            if realisations is not None and _is_random(document):
-                first = document["cell"].get("seed", 0)  # seed of realisation 1; a later check reports a faulty seed
-                inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
-                varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
+            if seeds[place]:
+                # A later check reports a faulty seed.
+                step = {path: s + realisation - 1 if isinstance(s, int) else s for path, s in seeds[place].items()}
+                varied = toml_files.with_values(document, step, faults)
+                inputs |= {wording.dotted_key(path): seed for path, seed in step.items()}
             elif realisation > 1:
                 continue
-            elif "cell.seed" in inputs:
-                group = repr({name: value for name, value in inputs.items() if name != "cell.seed"})
+            elif any(map(is_seed, inputs)):
+                group = repr({name: value for name, value in inputs.items() if not is_seed(name)})
             number = numbers.setdefault(group, len(numbers) + 1)
             counts[number] += 1
             ordered.append((SweepCase(len(ordered) + 1, number, counts[number], inputs, ""), varied))
     return ordered
 
 
-def _is_random(document: Mapping[str, Any]) -> bool:
-    cell = document.get("cell")
-    return isinstance(cell, dict) and cell.get("geometry") == "random"
+def _seeds(document: Mapping[str, Any]) -> dict[toml_files.TomlPath, Any]:
+    """Return the seeds of a random cell and of strengths that scatter, by path."""
+    cell, bonds = document.get("cell"), document.get("interface")
+    is_random = isinstance(cell, dict) and cell.get("geometry") == "random"
+    tables = {("cell",): cell} if is_random else {}
+    for number, bond in enumerate(interface_section.interface_tables(document), 1):
+        above = ("interface", str(number)) if isinstance(bonds, list) else ("interface",)
+        tables |= {(*above, "scatter"): bond["scatter"]} if isinstance(bond, dict) and "scatter" in bond else {}
+    return {(*path, "seed"): table.get("seed", 0) for path, table in tables.items() if isinstance(table, dict)}
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from feti_homog.report.text import tables
 from feti_homog.results import landmarks, path_curves
+from feti_homog.studies.axes import is_seed
 from feti_homog.studies.estimation import CONFIDENCE
 from feti_homog.typing import Document, Float
 
@@ -113,7 +114,7 @@ class SweepTable:
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
         """Return a phrase with the varying inputs of a point, except seeds and keys in `without`; "" without inputs."""
-        keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
+        keys = [name for name in self.inputs if name not in without and not is_seed(name)]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         labels = []
         for key in varied:

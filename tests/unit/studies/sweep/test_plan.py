@@ -113,6 +113,24 @@ def test_realisations_are_seeds_and_come_last():
     assert sweep.entries[:4] == fewer.entries
 
 
+def test_strengths_that_scatter_are_realised_too():
+    """In random and in other cells, of one interface and of several; lists of seeds give realisations of one point."""
+    bonds = "[interface]\nnormal_strength = 1.0\nscatter = {shape = 5.0, seed = 4}\n"
+    square, random = (f"{text.replace('stiffness', 'path')}[path]\nto.E11 = 0.1\n" for text in (CASE, RANDOM))
+    for case, cells in ((square, [0, 0]), (random, [0, 1])):
+        sweep = expanded("realisations = 2", case + bonds)
+        assert [(e.point, e.realisation) for e in sweep.entries] == [(1, 1), (1, 2)]
+        assert [case.cell.seed for case in sweep.cases] == cells
+        assert [case.interfaces[0].scatter.seed for case in sweep.cases] == [4, 5]
+    sweep = expanded('mode = "zip"\ncell.seed = [0, 1]\ninterface.scatter.seed = [7, 9]', random + bonds)
+    assert [(e.point, e.realisation) for e in sweep.entries] == [(1, 1), (1, 2)]
+    both = bonds.replace("[interface]\n", '[[interface]]\nbetween = ["matrix", "fibre"]\n')
+    sweep = expanded("realisations = 2", square + both)
+    assert [case.interfaces[0].scatter.seed for case in sweep.cases] == [4, 5]
+    with pytest.raises(CaseError, match=r"excludes interface\.scatter\.seed"):
+        expanded("realisations = 2\ninterface.scatter.seed = [1, 2]", square + bonds)
+
+
 def test_seeds_in_a_list_are_realisations_of_one_point():
     sweep = expanded("cell.seed = [4, 9]\ncell.fibre_fraction = [0.2, 0.3]", RANDOM)
     found = [(e.point, e.realisation, e.inputs["cell.fibre_fraction"], e.inputs["cell.seed"]) for e in sweep.entries]
@@ -160,7 +178,7 @@ FAULTY = {
     "mode": ("mode = 'rows'\ncell.order = [1]", ["[sweep] mode"]),
     "twice": ("cell.order = [1]\n'cell.order' = [2]", ["[sweep] cell.order: given twice"]),
     "twice by table": ("cell = [{order = 2}]\n'cell.order' = [1]", ["[sweep] cell.order: given twice"]),
-    "regular realisations": ("realisations = 2\ncell.order = [1]", ['only cells with geometry = "random"']),
+    "regular realisations": ("realisations = 2\ncell.order = [1]", ["only random cells and strengths that scatter"]),
     "too many": ("samples = 10000\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.2}", ["20000"]),
     "two units": ("output.stress_unit = ['GPa', 'MPa']", ["[output] stress_unit: expected the same in all cases"]),
     "a case's fault": (
