@@ -19,9 +19,13 @@ NAMES = {1: "Epoxy resin", 2: "E-Glass"}
         ({1: "resin", 2: "glass"}, {}, ("matrix", "glass"), 'add to [cell]: phases = {matrix = "resin"}.'),
         ({1: "resin", 2: "E 1"}, {}, ("matrix", "glass"), 'phases = {matrix = "resin", glass = "E 1"}.'),
         ({1: "matrix", 2: "E 1"}, {}, (), 'are fibres, add to [cell]: phases = {fibre = "E 1"}.'),
+        ({1: "fibre", 2: "resin"}, {}, (), 'add to [cell]: phases = {matrix = "resin"}. Shares'),
+        ({1: "Fibers", 2: "resin"}, {}, (), 'add to [cell]: phases = {matrix = "resin", fibre = "Fibers"}. Shares'),
+        ({1: "fibre:2", 2: "resin"}, {}, (), 'add to [cell]: phases = {matrix = "resin"}. Shares'),
     ],
 )
 def test_phases_that_are_proposed_read_the_mesh(tmp_path, names, phases, materials, proposed):
+    """Fibres are not the matrix, even if they are the largest group."""
     fault = replace(grid(), names=names).faults(tmp_path, phases=phases, materials=materials)[-1]
     assert proposed in fault and all(f'"{name}"' in fault.partition("the file has")[2] for name in names.values())
     entries = tomllib.loads(re.search(r"phases = \{.*?\}", fault)[0])["phases"]
