@@ -81,15 +81,6 @@ def test_bent_edges_go_through_their_middle_nodes(tmp_path):
         assert np.linalg.norm(on_arc - circle[:2], axis=1) == pytest.approx(np.full(3, circle[2]), rel=1e-12)
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_refinement_follows_an_ellipse(order, tmp_path):
-    """Each halving quarters what polygons lack of pi a b."""
-    polar_cell((0.5, 0.5), 0.2, tmp_path / "ellipse.msh", stretch=1.5, order=2, size=0.12)
-    mesh = read(tmp_path / "ellipse.msh")
-    missing = [1 - fibre_area(mesh, refinements, order) / (np.pi * 0.06) for refinements in range(6)]
-    assert np.array(missing[:-1]) / missing[1:] == pytest.approx(4.0, rel=0.03) and 0 < missing[-1] < 1e-4
-
-
 def test_debonded_lines_of_second_order(tmp_path):
     mesh = second_order(grid())
     line = (node(3, 1), node(3, 2))

@@ -60,19 +60,11 @@ def placed(width, height, size, rows, unit, folder):
 UNITS = 3.0, 0.17436714994531674, 7.7e-5, 12345.678
 
 
-def check(made, table, folder):
-    """Compare the mesh of a table in each unit with that in the first."""
-    one = made(*table, 1.0, folder)
+@pytest.mark.parametrize("name", [*TABLES, "a place"])
+def test_a_table_in_another_unit_has_one_mesh(name, tmp_path):
+    made, table = (listed, TABLES[name]) if name in TABLES else (placed, PLACED)
+    one = made(*table, 1.0, tmp_path)
     for unit in UNITS:
-        other = made(*table, unit, folder)
+        other = made(*table, unit, tmp_path)
         assert np.array_equal(one.triangles, other.triangles), unit
         assert np.abs(other.points / unit - one.points).max() < 1e-12
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_a_table_in_another_unit_has_one_mesh(name, tmp_path):
-    check(listed, TABLES[name], tmp_path)
-
-
-def test_so_has_one_with_a_place(tmp_path):
-    check(placed, PLACED, tmp_path)
