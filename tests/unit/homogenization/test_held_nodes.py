@@ -9,7 +9,7 @@ from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
 from support.layered_meshes import layers
 from support.pixel_images import pixel_mesh
-from unit.mesh.test_touching import BRANCHES, TWO_FIBRES
+from unit.mesh.test_bodies import BRANCHES, TWO_FIBRES
 
 from feti_homog import Case, run
 from feti_homog.analysis.description import describe
