@@ -7,7 +7,6 @@ from support.effective_results import BORON_ALUMINIUM, COSINES, DISTINCT, change
 from feti_homog.errors import CaseError
 from feti_homog.report.cards.effective_material import (
     NEGLIGIBLE,
-    ORDER,
     in_axes_of_the_cell,
     nearest_transversely_isotropic,
 )
@@ -22,13 +21,6 @@ def coupled(size):
     C[0, 5] = C[5, 0] = size * np.sqrt(C[0, 0] * C[5, 5])
     C[3, 4] = C[4, 3] = -size * np.sqrt(C[3, 3] * C[4, 4])
     return C
-
-
-def test_order_and_axes_of_cards_are_those_of_the_turned_tensor():
-    C = DISTINCT.stiffness_in_the_cell
-    assert np.array_equal(C[np.ix_(ORDER, ORDER)], turned_stiffness(C, COSINES.T))
-    assert ORDER == [2, 0, 1, 5, 3, 4]
-    assert np.linalg.det(COSINES) == 1.0
 
 
 def test_negligible_couplings_are_left_out_and_constants_are_those_of_the_compliance():
@@ -92,6 +84,10 @@ def test_expansions_need_not_be_there(reading):
         ({"effective_stiffness_compression": np.eye(6)}, "its debonded faces touch .*; cards are of linear materials"),
         ({"effective_stiffness": -np.eye(6)}, "is not positive definite; cards are of stable materials"),
         ({"effective_stiffness": None}, 'analysis.type = "stiffness" has no effective stiffness'),
+        (
+            {"case": changed(document(DISTINCT), "analysis", type="path")["case"], "effective_stiffness": None},
+            r'analysis.type = "path" has no effective stiffness; cards need "stiffness"',
+        ),
     ],
 )
 def test_results_without_a_linear_stable_material_are_refused(reading, more, words):
@@ -106,10 +102,3 @@ def test_constants_of_the_plane_are_refused(reading, plane):
     words = f'plane = "{plane}" gives constants of the plane; cards need plane = "generalized"'
     with pytest.raises(CaseError, match=words):
         reading(plain)
-
-
-def test_results_of_other_analyses_are_refused():
-    path = changed(document(DISTINCT), "analysis", type="path")
-    del path["effective_stiffness"]
-    with pytest.raises(CaseError, match=r'analysis.type = "path" has no effective stiffness; cards need "stiffness"'):
-        in_axes_of_the_cell(path)
