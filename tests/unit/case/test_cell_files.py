@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from support import cases
 from support.base_case import BASE, MESH_CELL
 
-from feti_homog import Case
 from feti_homog.case.cases import load
 from feti_homog.errors import CaseError
 
@@ -64,7 +64,6 @@ def test_the_digest_is_that_of_the_table(tmp_path):
 
 
 CELLS = {"file": {"geometry": "table", "file": "loop.csv"}, "match": {"geometry": "random", "match": "loop.csv"}}
-MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}}
 
 
 @pytest.mark.parametrize("key", CELLS)
@@ -76,6 +75,5 @@ MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, 
 def test_what_is_no_file(key, make, words, tmp_path, monkeypatch):
     make(tmp_path / "loop.csv")
     monkeypatch.chdir(tmp_path)
-    document = {"cell": CELLS[key], "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}}
     with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": {words}'):
-        Case.parse(document)
+        cases.case_of(CELLS[key])

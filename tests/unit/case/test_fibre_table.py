@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.cases import case_of
 from unit.case.faulty_fibre_tables import FAULTY_TABLES, HEAD
 
-from feti_homog import Case
 from feti_homog.errors import MOST_FAULTS, CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_table import read_table, table_of
@@ -41,13 +41,7 @@ MIRRORED = ("ImageJ", "scikit-image", "MATLAB's regionprops", "rows and columns"
 
 def case(path, text, **cell):
     path.write_text(text)
-    return Case.parse(
-        {
-            "cell": {"geometry": "table", "file": str(path)} | cell,
-            "material": {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}},
-            "analysis": {"type": "stiffness", "plane": "strain"},
-        }
-    )
+    return case_of({"geometry": "table", "file": str(path)} | cell)
 
 
 def is_expected(table):

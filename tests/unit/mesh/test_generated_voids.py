@@ -6,12 +6,12 @@ import pytest
 import tomli_w
 from mpi4py import MPI
 from pattern_statistics import smallest_gap
+from support import cases
 from support.circular_cells import cell as circular
 from support.generated_meshes import generate
 from support.void_cells import write_voids
 
 from feti_homog import run
-from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh import Torus
@@ -31,9 +31,7 @@ ROWS = [
 
 def case_of(tmp_path, cell, *phases):
     material = {"matrix": MATRIX} | {phase: {"young": 70.0, "poisson": 0.2} for phase in phases or ("fibre",)}
-    return cases.parse(
-        {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}, tmp_path
-    )
+    return cases.case_of(cell, tmp_path, material=material)
 
 
 def table(rows, **keys):

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.cases import case_of
 from support.generated_meshes import generate
 
-from feti_homog.case import cases
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MOST_FAULTS, MeshError
 from feti_homog.mesh.arrange import arrange
@@ -157,12 +157,7 @@ def of_unit(rows, unit):
 
 
 def mesh(cell, folder):
-    document = {
-        "cell": {"geometry": "table"} | cell,
-        "material": {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    return generate(cases.parse(document, folder).cell)
+    return generate(case_of({"geometry": "table"} | cell, folder).cell)
 
 
 def listed(width, height, size, rows, unit, folder):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.cases import make_case
 from support.verified_results import CARBON as WARM_CARBON
 from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WARM
 
 from feti_homog.case.bond_laws import LAWS
-from feti_homog.case.cases import parse
 from feti_homog.errors import CaseError
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.bond_law import law_class
@@ -31,15 +31,10 @@ IN_SPACE = {
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 @pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_SPACE, CARBON, BY_SHEAR, IN_PLANE, SHEET])
-def test_both_ways_to_the_law_of_a_plane_state_agree(tmp_path, fibre, plane):
+def test_both_ways_to_the_law_of_a_plane_state_agree(fibre, plane):
     if plane == "strain" and fibre in (IN_PLANE, SHEET):
         pytest.skip("plane strain needs constants out of the plane")
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.3},
-        "material": {"matrix": MATRIX, "fibre": fibre},
-        "analysis": {"type": "stiffness", "plane": plane},
-    }
-    case = parse(document, tmp_path)
+    case = make_case(matrix=MATRIX, fibre=fibre, plane=plane)
     phases = ["matrix", "fibre", "fibre:2"]
     own, _ = laws(case.resolved(), phases)
     rules = constitutive_law.out_of_plane(case.resolved(), phases)
@@ -55,13 +50,8 @@ WARM_BY_SHEAR = BY_SHEAR | {"G_axial": 28.0, "expansion": 1e-6}
 @pytest.mark.parametrize(
     "fibre", [WARM, TURNED_IN_SPACE, WARM_CARBON, WARM_BY_SHEAR, IN_SPACE | {"expansion": [1e-6, 2e-6, 3e-6]}]
 )
-def test_both_ways_to_the_law_in_space_agree(tmp_path, fibre):
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.3},
-        "material": {"matrix": WARM, "fibre": fibre},
-        "analysis": {"type": "stiffness", "plane": "generalized"},
-    }
-    case = parse(document, tmp_path)
+def test_both_ways_to_the_law_in_space_agree(fibre):
+    case = make_case(matrix=WARM, fibre=fibre, plane="generalized")
     own, free = laws(case.resolved(), ["matrix", "fibre"])
     for stiffness, strain, phase in zip(own, free, ("matrix", "fibre"), strict=True):
         expected = spatial_stiffness(case.material_of(phase))
@@ -97,13 +87,8 @@ ORTHOTROPIC = {f"E{k}": 3.0 for k in (1, 2, 3)} | {"nu12": 0.2, "nu13": 0.2, "nu
         (ORTHOTROPIC, None),
     ],
 )
-def test_both_find_who_is_isotropic(tmp_path, constants, ratio):
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4}}
-    document |= {
-        "material": {"matrix": constants, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    case = parse(document, tmp_path)
+def test_both_find_who_is_isotropic(constants, ratio):
+    case = make_case(matrix=constants, fibre=FIBRE)
     assert isotropic_ratio(case.material_of("matrix")) == (None if ratio is None else pytest.approx(ratio, rel=1e-9))
     own = {"cell": {}, "analysis": {"plane": "strain"}, "material": {"matrix": constants}}
     assert constitutive_law.mixed_phases(own, ["matrix"]).tolist() == [ratio is not None]

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX
+from support.cases import case_of
 from support.pixel_images import quadrilaterals
 from support.users_meshes import converted
 from support.vtk_files import vtk_grid
 from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, N, grid, node
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.msh_reader import read
@@ -156,12 +156,7 @@ FILES = {
 
 
 def stiffness(path: Path, **cell: Any) -> Any:
-    document = {
-        "cell": {"geometry": "mesh", "file": str(path)} | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    return run(Case.parse(document), MPI.COMM_SELF).effective_stiffness
+    return run(case_of({"geometry": "mesh", "file": str(path)} | cell), MPI.COMM_SELF).effective_stiffness
 
 
 def cut_by_turns() -> MshFile:
