@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, case_of
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
@@ -123,14 +123,11 @@ def test_springs_that_turn_with_an_ellipse_err_on_unlike_sides(comm):
 
 
 def test_kept_points_of_a_path_have_errors_of_their_energies(comm):
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05, "refine": 0, "order": 1}}
-    document |= {"material": {"matrix": MATRIX, "fibre": FIBRE}, "analysis": {"type": "path", "plane": "strain"}}
-    document["interface"] = {"contact": False, "normal_strength": 1.0, "tangential_strength": 1.0}
-    document |= {"path": {"strain": [0.02, 0.0, 0.0]}, "output": {"states": "all"}}
-    document["decomposition"] = {"subdomains": 4}
-    points = run(Case.parse(document), comm, fields=True).path
-    same = {name: document[name] for name in ("cell", "material")}  # no cut changes estimates
-    stiffness = run(Case.parse(same | UNIT), comm, fields=True)
+    cell = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05, "refine": 0, "order": 1}
+    bonds = {"contact": False, "normal_strength": 1.0, "tangential_strength": 1.0}
+    sections = {"path": {"strain": [0.02, 0.0, 0.0]}, "output": {"states": "all"}, "decomposition": {"subdomains": 4}}
+    points = run(case_of(cell, interface=bonds, **sections), comm, fields=True).path
+    stiffness = run(case_of(cell), comm, fields=True)  # no cut changes estimates
     first = stiffness.mesh_error.effective_stiffness[0, 0] / stiffness.effective_stiffness[0, 0]
     assert points[0].mesh_error == pytest.approx(first, rel=1e-6)
     assert all(0 < point.mesh_error < 0.1 for point in points)

@@ -112,10 +112,9 @@ def test_springs_of_bonds_that_soften_the_cell_are_remarked(keys: Any, remarked:
     def with_springs(normal: float, tangential: float) -> list[str]:
         springs = {"normal_stiffness": normal, "tangential_stiffness": tangential}
         both = {name.replace("normal", "tangential"): value for name, value in (keys or {}).items()}
-        analysis = {"type": "path" if keys else "stiffness", "plane": "strain"}
         more = {"path": {"strain": [0.01, 0.0, 0.0]}} if keys else {}
         interface = springs | (keys or {}) | ({} if keys and "toughness" in keys else both)
-        case = case_of(cell, material=materials, interface=interface, analysis=analysis, **more)
+        case = case_of(cell, material=materials, interface=interface, **more)
         lines = describe(case, MPI.COMM_SELF).splitlines()
         return [line for line in lines if line.startswith("remark     [interface]") and "k r / E'" in line]
 
