@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support import cases, coated_cells
+from support import cases
 from support.ranks import assert_certified
+from support.void_cells import write_rings
 from unit.mesh.faulty_meshes import MATRIX, grid, node
 
 from feti_homog import run
@@ -39,7 +40,7 @@ def meshes(comm, shared_path):
 
     def write():
         for name, core, ring in (("plain", "fibre", "fibre"), ("coated", *INNER), ("core", "fibre", "matrix")):
-            coated_cells.write(shared_path / f"{name}.msh", core, ring)
+            write_rings(shared_path / f"{name}.msh", core, ring)
 
     on_root(comm, write)
     return shared_path

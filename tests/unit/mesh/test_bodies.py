@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import coated_cells
 from support.generated_meshes import generate, mesh_of_discs
 from support.pixel_images import SYMMETRIES, pixel_mesh
+from support.void_cells import write_rings
 from unit.case.test_interface_pairs import Case, document
 from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, node
 
@@ -145,7 +145,7 @@ def test_lines_that_cannot_debond_are_refused(mesh, message, tmp_path):
 
 @pytest.fixture
 def coated(tmp_path):
-    coated_cells.write(tmp_path / "coated.msh", "fibre", "fibre:2")
+    write_rings(tmp_path / "coated.msh", "fibre", "fibre:2")
     return read(tmp_path / "coated.msh")
 
 
