@@ -12,7 +12,6 @@ from feti_homog.report.cards.effective_material import (
 )
 
 both = pytest.mark.parametrize("reading", [in_axes_of_the_cell, nearest_transversely_isotropic])
-SHEAR_23_AND_13, SHEAR_12 = np.eye(6)[[3, 4]], np.eye(6)[5]
 
 
 def coupled(size):

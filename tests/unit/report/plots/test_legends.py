@@ -13,7 +13,6 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from PIL import Image
-from support.figure_words import panels
 from support.sample_output import in_space, path_of, sample, write
 
 from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves
@@ -49,6 +48,14 @@ def of_cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Figure]:
 def of_path(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Figure]:
     """Provide the figures of a path whose load falls once."""
     return drawn(write(tmp_path_factory.mktemp("path"), sample(4), path_of([0.5, 0.2, 1.0])).parent)
+
+
+def panels(figure: Figure) -> list[tuple[str, str, dict[str, np.ndarray]]]:
+    """Return the two labels of each panel, and by name the heights of its curves."""
+    return [
+        (axes.get_xlabel(), axes.get_ylabel(), {str(c.get_label()): np.asarray(c.get_ydata()) for c in axes.lines})
+        for axes in figure.axes
+    ]
 
 
 def legends(figure: Figure) -> list[Legend]:
