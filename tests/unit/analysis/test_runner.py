@@ -7,10 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import make_case
+from support.cases import case_of, make_case
 
 from feti_homog.analysis import runner
-from feti_homog.case import cases
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization import unit_cell
 from feti_homog.results import output_folder
@@ -67,19 +66,17 @@ def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("to", [{"S22": 100.0}, {"S11": -1.0, "S22": 90.0}, {"E22": 0.01}])
 def test_a_load_that_falls_from_its_largest_value_has_one_line(to, tmp_path, monkeypatch):
-    cohesive = {"normal_stiffness": 1e5, "tangential_stiffness": 1e5, "normal_toughness": 0.02}
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15},
-        "material": {"matrix": {"young": 4e3, "poisson": 0.35}, "fibre": {"young": 7e4, "poisson": 0.2}},
-        "analysis": {"type": "path", "plane": "strain"},
-        "interface": cohesive
-        | {"law": "bilinear", "normal_strength": 60.0, "tangential_strength": 85.0, "tangential_toughness": 0.04},
-        "path": {"to": to, "max_events": 100},
-        "output": {"fields": False, "pictures": False},
-    }
+    cohesive = {"law": "bilinear", "normal_stiffness": 1e5, "tangential_stiffness": 1e5, "normal_toughness": 0.02}
+    cohesive |= {"normal_strength": 60.0, "tangential_strength": 85.0, "tangential_toughness": 0.04}
+    case = case_of(
+        {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15},
+        material={"matrix": {"young": 4e3, "poisson": 0.35}, "fibre": {"young": 7e4, "poisson": 0.2}},
+        interface=cohesive,
+        path={"to": to, "max_events": 100},
+    )
     lines = []
     monkeypatch.setattr(Progress, "say", lambda self, line: lines.append(line))
-    result = runner.run(cases.parse(document, tmp_path), tmp_path / "out", Progress(MPI.COMM_SELF, True))
+    result = runner.run(case, tmp_path / "out", Progress(MPI.COMM_SELF, True))
     printed = [line for line in lines if "largest value so far" in line]
     if "E22" in to:  # the strain prescribes where the path ends
         assert printed == [] and not any("jumps" in line for line in result.remarks)

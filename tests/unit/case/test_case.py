@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.base_case import BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, SPATIAL, changed, fibre
+from support.cases import make_case
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, FAULTY_COHESIVE_LAWS, PATH, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES, FAULTY_SIZES, FAULTY_TABLE_CELLS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
@@ -212,15 +213,10 @@ def test_keys_of_friction_without_friction_are_warned_of():
     numbers = {"stiffness": 10.0, "strength": 1.0, "toughness": 1.0}
     interface = {f"{side}_{name}": value for side in ("normal", "tangential") for name, value in numbers.items()}
     interface |= {"law": "bilinear", "friction": 0.0, "friction_on_damage": True}
-    asked = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-        "material": {name: {"young": 1.0, "poisson": 0.3} for name in ("matrix", "fibre")},
-        "analysis": {"type": "path", "plane": "generalized"},
-        "path": {"waypoints": [{"E11": 0.01}]},
-    }
-    (words,) = parse(asked | {"interface": interface}, Path()).warnings()
+    asked = make_case(plane="generalized").replace({"analysis.type": "path", "path": {"waypoints": [{"E11": 0.01}]}})
+    (words,) = asked.replace({"interface": interface}).warnings()
     assert words == "[interface] friction_on_damage = true: without effect, for friction = 0"
-    assert parse(asked | {"interface": interface | {"friction": 0.3}}, Path()).warnings() == ()
+    assert asked.replace({"interface": interface | {"friction": 0.3}}).warnings() == ()
 
 
 @pytest.mark.parametrize("sizes", ["", "accuracy = 0.1\n"])
