@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, case_of
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
@@ -101,14 +101,11 @@ def test_tips_to_which_the_mesh_is_not_graded_are_known_from_the_mesh_itself(com
 def test_springs_at_tips_hold_a_part_of_debonded_faces(comm, order):
     stored = 0.669026  # of this cell by meshes refined up to four times, quadratic elements
     cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [{"x": 0.5, "y": 0.5, "radius": 0.3}]}
-    document = {"cell": cell | {"mesh_size": 0.2, "order": order, "refine": 2 - order}, "load": {"to": {"S11": 1.0}}}
-    document["material"] = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}
-    arc = {"fibre": 1, "centre": 0.0, "angle": 120.0}
-    document |= {
-        "analysis": {"type": "load", "plane": "strain"},
-        "interface": {"normal_stiffness": 10.0, "tangential_stiffness": 4.0, "contact": False} | {"debonded": [arc]},
-    }
-    found = run(Case.parse(document), comm).load
+    cell |= {"mesh_size": 0.2, "order": order, "refine": 2 - order}
+    phases = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}
+    springs = {"normal_stiffness": 10.0, "tangential_stiffness": 4.0, "contact": False}
+    bonds = springs | {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 120.0}]}
+    found = run(case_of(cell, load={"to": {"S11": 1.0}}, material=phases, interface=bonds), comm).load
     assert 0.8 < (stored - found.stored) / stored / found.mesh_error < 1.25  # 1.9 and 6.7 without
 
 
@@ -123,14 +120,11 @@ def test_springs_that_turn_with_an_ellipse_err_on_unlike_sides(comm):
 
 
 def test_kept_points_of_a_path_have_errors_of_their_energies(comm):
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05, "refine": 0, "order": 1}}
-    document |= {"material": {"matrix": MATRIX, "fibre": FIBRE}, "analysis": {"type": "path", "plane": "strain"}}
-    document["interface"] = {"contact": False, "normal_strength": 1.0, "tangential_strength": 1.0}
-    document |= {"path": {"strain": [0.02, 0.0, 0.0]}, "output": {"states": "all"}}
-    document["decomposition"] = {"subdomains": 4}
-    points = run(Case.parse(document), comm, fields=True).path
-    same = {name: document[name] for name in ("cell", "material")}  # no cut changes estimates
-    stiffness = run(Case.parse(same | UNIT), comm, fields=True)
+    cell = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05, "refine": 0, "order": 1}
+    bonds = {"contact": False, "normal_strength": 1.0, "tangential_strength": 1.0}
+    sections = {"path": {"strain": [0.02, 0.0, 0.0]}, "output": {"states": "all"}, "decomposition": {"subdomains": 4}}
+    points = run(case_of(cell, interface=bonds, **sections), comm, fields=True).path
+    stiffness = run(case_of(cell), comm, fields=True)  # no cut changes estimates
     first = stiffness.mesh_error.effective_stiffness[0, 0] / stiffness.effective_stiffness[0, 0]
     assert points[0].mesh_error == pytest.approx(first, rel=1e-6)
     assert all(0 < point.mesh_error < 0.1 for point in points)

@@ -1,17 +1,16 @@
 """Nodes debonded from the start, at any number of ranks, bodies and pieces."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from support import cases
 from support.cases import FIBRE, MATRIX
 from support.ranks import parallel_assert, write_once
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
-from feti_homog.case import cases
+from feti_homog import Case
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.mesh.arrange import arrange
@@ -26,14 +25,9 @@ ARC = {"fibre": "all", "angle": 60.0}
 
 
 def case_of(cell, debonded, folder=".", subdomains=None, **sections):
-    document = {
-        "cell": cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "angle" if "angle" in sections else "stiffness", "plane": "strain"},
-        "interface": {"debonded": debonded},
-        "decomposition": {"subdomains": subdomains} if subdomains else {},
-    }
-    return cases.parse(document | sections, Path(folder))
+    cut = {"subdomains": subdomains} if subdomains else {}
+    sections = {"interface": {"debonded": debonded}, "decomposition": cut} | sections
+    return cases.case_of(cell, folder, petsc={}, **sections)
 
 
 def torn(case, comm):
@@ -145,7 +139,7 @@ def test_without_an_interface_section_all_is_bonded(comm, shared_path):
     write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
     case = case_of({"geometry": "mesh", "file": "grid.msh"}, [], shared_path)
     document = {name: section for name, section in case.resolved().items() if name != "interface"}
-    _, nodes = torn(cases.parse(document, shared_path), comm)
+    _, nodes = torn(Case.parse(document, shared_path), comm)
     parallel_assert(comm, not nodes()[2].any())
     comm.barrier()
 

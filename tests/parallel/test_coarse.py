@@ -1,17 +1,14 @@
 """The adaptive coarse space against dense algebra."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpi4py import MPI
 from reference import dense_feti
 from scipy.linalg import eigh
 from support import torn_cells
-from support.cases import FIBRE, MATRIX, relative_error, solve
+from support.cases import FIBRE, MATRIX, case_of, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, agree, masks, of_all, solve_many
 
-from feti_homog.case import cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.interface_neighbours import Neighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -135,17 +132,11 @@ def test_a_coarse_space_without_vectors(comm):
     """Two pieces of a matrix around a void that both hold the pinned class: none can move, and none is soft."""
     found = []
     for space in ("adaptive", "natural"):
-        document = {
-            "cell": {
-                "geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.1,
-                "fibre_list": [{"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}],
-            },
-            "material": {"matrix": {"young": 100.0, "poisson": 0.3}},
-            "analysis": {"type": "stiffness", "plane": "strain"},
-            "decomposition": {"subdomains": 2},
-            "petsc": {"feti_coarse_space": space, "feti_ksp_rtol": 1e-10},
-        }  # fmt: skip
-        cell, L, _ = solve(cases.parse(document, Path()), comm)
+        void = {"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}
+        table = {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.1, "fibre_list": [void]}
+        petsc = {"feti_coarse_space": space, "feti_ksp_rtol": 1e-10}
+        case = case_of(table, material={"matrix": MATRIX}, decomposition={"subdomains": 2}, petsc=petsc)
+        cell, L, _ = solve(case, comm)
         found.append(L)
         if comm.size <= 2:
             assert cell.solver.coarse_dimension == 0

@@ -1,12 +1,11 @@
 """Cells of coated fibres against closed forms, plain cells and elastic interfaces."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.cases import case_of
 from support.ranks import assert_certified
 
-from feti_homog import Case, run
+from feti_homog import run
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -14,19 +13,15 @@ MATRIX, FIBRE = (3.0, 0.35), (70.0, 0.2)
 TIGHT = {"feti_ksp_rtol": 1e-8}
 
 
+def phases_of(**phases):
+    return {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()}
+
+
 def result_of(coating, thickness=None, interface=None, **cell):
-    phases = {"matrix": MATRIX, "fibre": FIBRE} | ({} if thickness is None else {"coating": coating})
-    document = {
-        "cell": {"geometry": "square", "mesh_size": 0.1, "order": 2, "refine": 1, **cell},
-        "material": {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": TIGHT,
-    }
-    if thickness is not None:
-        document["cell"]["coating"] = thickness
-    if interface:
-        document["interface"] = interface
-    result = run(Case.parse(document, Path()))
+    materials = phases_of(matrix=MATRIX, fibre=FIBRE, **({} if thickness is None else {"coating": coating}))
+    cell = {"geometry": "square", "mesh_size": 0.1, "order": 2, "refine": 1} | cell
+    cell |= {} if thickness is None else {"coating": thickness}
+    result = run(case_of(cell, material=materials, petsc=TIGHT, interface=interface))
     assert result.status == "done"
     return result
 
@@ -85,32 +80,24 @@ def test_thin_coatings_take_few_iterations(young):
 @pytest.mark.parametrize("thickness", [0.05, 0.01])
 def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
     cell = {"geometry": "square", "mesh_size": 0.1, "fibre_fraction": 0.3, "coating": thickness, "order": 2}
-    phases = {"matrix": MATRIX, "fibre": FIBRE, "coating": (1.0, 0.35)}
-    document = {
-        "cell": cell,
-        "material": {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"pictures": False},
-    }
-    run(Case.parse(document, Path()), out=shared_path / "result", comm=comm)
+    phases = phases_of(matrix=MATRIX, fibre=FIBRE, coating=(1.0, 0.35))
+    run(case_of(cell, material=phases, petsc={}), out=shared_path / "result", comm=comm)
     assert_certified(comm, shared_path / "result")
 
 
 @pytest.mark.one_rank
 def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
     """Balance forces to their own rounding at 1e5 times the stiffness around, free or rubbing."""
-    whole, young = {"debonded": [{"fibre": 1, "angle": 360.0}]}, {"matrix": 1.0, "fibre": 9.0, "coating": 1e5}
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.1},
-        "material": {name: {"young": E, "poisson": 0.3} for name, E in young.items()},
-        "analysis": {"type": "path", "plane": "strain"},
-        "interface": [
-            {"between": ["coating", "matrix"], "friction": 0.3} | whole,
-            {"between": ["fibre", "coating"]} | whole,
-        ],
-        "path": {"waypoints": [{"E11": -0.01, "E22": -0.004}, {"gamma12": 0.02}]},
-        "output": {"pictures": False, "states": "all"},
-    }
-    result = run(Case.parse(document), comm, out=shared_path / "out")
+    whole = {"debonded": [{"fibre": 1, "angle": 360.0}]}
+    outer, inner = {"between": ["coating", "matrix"], "friction": 0.3}, {"between": ["fibre", "coating"]}
+    case = case_of(
+        {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.1},
+        material=phases_of(matrix=(1.0, 0.3), fibre=(9.0, 0.3), coating=(1e5, 0.3)),
+        interface=[outer | whole, inner | whole],
+        path={"waypoints": [{"E11": -0.01, "E22": -0.004}, {"gamma12": 0.02}]},
+        output={"pictures": False, "states": "all"},
+        petsc={},
+    )
+    result = run(case, comm, out=shared_path / "out")
     assert result.path[-1].debonding_angle == pytest.approx([360.0])  # of both interfaces together
     assert_certified(comm, shared_path / "out")

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from reference.closed_forms import lame
 from support import torn_cells
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, case_of
 from support.load_paths import beginning, followed
 from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 
@@ -76,19 +76,10 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
 def test_springs_along_the_fibres_are_those_around_them_by_default(comm, strip, shared_path, axial):
     """1 / C55 = <1 / mu> + 2 / (k_a W) and 1 / C66 with k_t, of axial shear across the layers and in the plane."""
     springs = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL}
-    found = run(
-        Case.parse(
-            {
-                "cell": {"geometry": "mesh", "file": "strip.msh", "order": 1},
-                "material": {"matrix": MATRIX, "fibre": FIBRE},
-                "analysis": {"type": "stiffness", "plane": "generalized"},
-                "interface": springs | ({} if axial is None else {"axial_stiffness": axial}),
-                "output": {"mesh_error": False},
-            },
-            shared_path,
-        ),
-        comm,
-    ).effective_stiffness
+    springs |= {} if axial is None else {"axial_stiffness": axial}
+    cell = {"geometry": "mesh", "file": "strip.msh", "order": 1}
+    case = case_of(cell, shared_path, "generalized", interface=springs, output={"mesh_error": False})
+    found = run(case, comm).effective_stiffness
     matrix, fibre = lame(MATRIX)[1], lame(FIBRE)[1]
     shears = [series(matrix, fibre, k) for k in (TANGENTIAL if axial is None else axial, TANGENTIAL)]
     assert [found[4, 4], found[5, 5]] == pytest.approx(shears, rel=1e-7)

@@ -1,15 +1,12 @@
 """L^ef of cells of tables with ellipses: Eshelby's solution, cells turned by a right angle, laws."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from parallel.test_users_meshes import eshelby, plane_strain
-from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from support.cases import FIBRE, MATRIX, case_of, monolithic_stiffness, relative_error, solve
 from support.ranks import assert_certified
 
-from feti_homog import Case, run
-from feti_homog.case import cases
+from feti_homog import run
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -20,14 +17,13 @@ ROWS = [
 ]
 
 
+def table(rows, **cell):
+    return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | cell
+
+
 def solved(comm, rows, coating=None, **cell):
-    document = {
-        "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE} | ({} if coating is None else {"coating": coating}),
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": 1e-11},
-    }
-    return solve(cases.parse(document, Path()), comm)[:2]
+    materials = {"matrix": MATRIX, "fibre": FIBRE} | ({} if coating is None else {"coating": coating})
+    return solve(case_of(table(rows, **cell), material=materials), comm)[:2]
 
 
 def stiffness(comm, rows, coating=None, **cell):
@@ -50,21 +46,9 @@ def test_few_ellipses_have_the_stiffness_of_eshelby(comm):
 @pytest.mark.quick
 @pytest.mark.parametrize("order", [1, 2])
 def test_debonded_ellipse_obeys_every_law(comm, shared_path, order):
-    document = {
-        "cell": {
-            "geometry": "table",
-            "width": 1.0,
-            "height": 1.0,
-            "fibre_list": ROWS,
-            "mesh_size": 0.15,
-            "order": order,
-        },
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "interface": {"contact": True, "debonded": [{"fibre": [1, 2], "centre": 40.0, "angle": 110.0}]},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"pictures": False},
-    }
-    run(Case.parse(document), comm, out=shared_path / "out")
+    arcs = {"contact": True, "debonded": [{"fibre": [1, 2], "centre": 40.0, "angle": 110.0}]}
+    case = case_of(table(ROWS, mesh_size=0.15, order=order), interface=arcs, petsc={})
+    run(case, comm, out=shared_path / "out")
     assert_certified(comm, shared_path / "out")
 
 

@@ -10,11 +10,12 @@ from reference.closed_forms import bulk_and_shear
 from reference.coated_fibre import onset_of_fibre
 from reference.references import GLASS_EPOXY_CURVES, GLASS_EPOXY_DEBONDED, GLASS_EPOXY_MULTIPLES, GLASS_EPOXY_ONSET
 from support import torn_cells
+from support.cases import case_of
 from support.load_paths import beginning, followed
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
@@ -55,22 +56,13 @@ def onset(comm, **case):
 
 
 def test_elements_too_long_for_the_energy_are_warned_of(comm):
-    document = {
-        "cell": {name: SQUARE[name] for name in ("geometry", "fibre_fraction", "fibre_radius")},
-        "material": GLASS_EPOXY,
-        "analysis": {"type": "path", "plane": "strain"},
-        "interface": {
-            "normal_stiffness": NORMAL,
-            "tangential_stiffness": TANGENTIAL,
-            "criterion": "energy",
-            "toughness": TOUGHNESS,
-        },
-        "path": {"strain": [0.5 * ONSET_STRAIN, 0.0, 0.0]},
-    }
-    (line,) = run(Case.parse(document), comm).warnings
+    cell = {name: SQUARE[name] for name in ("geometry", "fibre_fraction", "fibre_radius")}
+    springs = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL}
+    bonds = springs | {"criterion": "energy", "toughness": TOUGHNESS}
+    case = case_of(cell, material=GLASS_EPOXY, interface=bonds, path={"strain": [0.5 * ONSET_STRAIN, 0.0, 0.0]})
+    (line,) = run(case, comm).warnings
     parallel_assert(comm, "elements on the interface are up to 0.981 long" in line)
-    document["cell"] |= {"interface_size": 0.018}
-    parallel_assert(comm, run(Case.parse(document), comm).warnings == ())
+    parallel_assert(comm, run(case.replace({"cell.interface_size": 0.018}), comm).warnings == ())
 
 
 def test_onset_in_the_square_cell_is_the_published_one(comm):

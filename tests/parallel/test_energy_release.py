@@ -3,17 +3,15 @@
 They are compared with differences of the energy, published numbers and laws.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
-from support.cases import FIBRE, MATRIX, relative_error
+from support.cases import FIBRE, MATRIX, case_of, relative_error
 from support.ranks import parallel_assert, write_once
 from support.void_cells import write_voids
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
-from feti_homog import Case, run
+from feti_homog import run
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
@@ -31,16 +29,15 @@ STEP = 0.5
 
 def solved(comm, strain, openings, bond, arc=(), materials=(), pieces=None, folder=".", **cell):
     """Return the points of an angle under a strain, and the area of the cell."""
-    document = {
-        "cell": SQUARE | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
-        "analysis": {"type": "angle", "plane": "strain"},
-        "interface": {"debonded": [{"fibre": 1} | dict(arc)]} | bond,
-        "angle": {"values": openings, "strain": strain},
-        "petsc": {"feti_ksp_rtol": 1e-10},
-        "decomposition": pieces or {},
-    }
-    result = run(Case.parse(document, Path(folder)), comm)
+    case = case_of(
+        SQUARE | cell,
+        folder,
+        material={"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
+        interface={"debonded": [{"fibre": 1} | dict(arc)]} | bond,
+        angle={"values": openings, "strain": strain},
+        decomposition=pieces,
+    )
+    result = run(case, comm)
     return result.angle, result.cell.area
 
 
@@ -123,18 +120,14 @@ def test_without_tips_there_is_no_rate(comm, opening):
 
 
 def test_stiffness_has_the_tips_of_all_its_loads(comm):
-    document = {
-        "cell": SQUARE | {"order": 1},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
+    cell = SQUARE | {"order": 1}
     arc, totals = {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]}, []
-    parallel_assert(comm, run(Case.parse(document), comm).tips is None)
+    parallel_assert(comm, run(case_of(cell), comm).tips is None)
     for contact, loads in (
         (False, ("E11", "E22", "gamma12")),
         (True, ("E11", "E22", "gamma12", "-E11", "-E22", "-gamma12")),
     ):
-        tips = run(Case.parse(document | {"interface": arc | {"contact": contact}}), comm).tips
+        tips = run(case_of(cell, interface=arc | {"contact": contact}), comm).tips
         expected = [(load, angle) for load in loads for angle in (-15.0, 75.0)]
         found = list(zip(tips.load, np.round(tips.angle, 6).tolist(), strict=True))
         parallel_assert(comm, found == expected and bool((tips.G >= 0).all()))
@@ -144,26 +137,16 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
 
 @pytest.mark.parametrize(("load", "label"), [({"S11": 0.1}, "load"), ({"E11": 0.01, "E22": 0.0}, "strain")])
 def test_tips_name_a_load_by_what_it_gives(comm, load, label):
-    document = {
-        "cell": SQUARE | {"order": 1},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "load", "plane": "strain"},
-        "load": {"to": load},
-        "interface": {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]},
-    }
-    parallel_assert(comm, set(run(Case.parse(document), comm).load.tips.load) == {label})
+    arc = {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]}
+    case = case_of(SQUARE | {"order": 1}, load={"to": load}, interface=arc)
+    parallel_assert(comm, set(run(case, comm).load.tips.load) == {label})
 
 
 def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     """A square one, debonded on its right side."""
     write_once(comm, grid().with_curve(RIGHT_SIDE), shared_path / "grid.msh")
-    document = {
-        "cell": {"geometry": "mesh", "file": "grid.msh", "refine": 1},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "interface": {},
-    }
-    result = run(Case.parse(document, shared_path), comm)
+    case = case_of({"geometry": "mesh", "file": "grid.msh", "refine": 1}, shared_path, interface={})
+    result = run(case, comm)
     parallel_assert(comm, result.tips.load == ())
     comm.barrier()
 
@@ -189,15 +172,9 @@ def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
 
 def loaded(comm, cell, arcs, materials=(), folder="."):
     """Return the point of a load on the cell, whose arcs are 100 degrees long by default."""
-    document = {
-        "cell": cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
-        "analysis": {"type": "load", "plane": "strain"},
-        "interface": {"debonded": [{"angle": 100.0} | arc for arc in arcs]} | FREE,
-        "load": {"to": {"E11": 0.3, "E22": 0.2, "gamma12": 0.5}},
-        "petsc": {"feti_ksp_rtol": 1e-11},
-    }
-    return run(Case.parse(document, Path(folder)), comm).load
+    materials, load = {"matrix": MATRIX, "fibre": FIBRE} | dict(materials), {"E11": 0.3, "E22": 0.2, "gamma12": 0.5}
+    bonds = {"debonded": [{"angle": 100.0} | arc for arc in arcs]} | FREE
+    return run(case_of(cell, folder, material=materials, interface=bonds, load={"to": load}), comm).load
 
 
 @pytest.mark.quick
@@ -239,18 +216,9 @@ def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, g
 
     def solved_with(opening):
         arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]
-        document = {
-            "cell": SQUARE | cell,
-            "material": {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 20.0, "poisson": 0.3}},
-            "analysis": {"type": "load", "plane": "strain"},
-            "interface": [
-                {"between": INNER, "debonded": arcs[:1]} | bond,
-                {"between": OUTER, "debonded": arcs[1:]} | bond,
-            ],
-            "load": {"to": strain},
-            "petsc": {"feti_ksp_rtol": 1e-10},
-        }
-        return run(Case.parse(document), comm).load
+        materials = {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 20.0, "poisson": 0.3}}
+        bonds = [{"between": pair, "debonded": [arc]} | bond for pair, arc in zip((INNER, OUTER), arcs, strict=True)]
+        return run(case_of(SQUARE | cell, material=materials, interface=bonds, load={"to": strain}), comm).load
 
     energies = [np.dot(solved_with(100.0 + 2 * half).stress, list(strain.values())) / 2 for half in (-STEP, STEP)]
     tips, own = solved_with(100.0).tips, 1 + [INNER, OUTER].index(growing)

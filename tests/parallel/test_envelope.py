@@ -5,11 +5,11 @@ import csv
 import numpy as np
 import pytest
 from support import torn_cells
-from support.envelopes import ENERGY, MAX, QUADRATIC, document, envelope, path_onset, torn
+from support.envelopes import ENERGY, MAX, QUADRATIC, case_of, envelope, path_onset, torn
 from support.ranks import parallel_assert, write_once
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
@@ -246,11 +246,9 @@ def test_cooling_alone_may_break_bonds(comm):
 
 
 def test_its_files_are_written_and_hold_what_they_say(comm, shared_path):
-    case = document(
-        "generalized", MAX | ALONG, analysis={"type": "envelope"}, envelope={"plane": ["S22", "S13"], "directions": 8},
-        output={"fields": True, "pictures": False, "report": False},
-    )  # fmt: skip
-    result = run(Case.parse(case), comm, out=shared_path)
+    asked = {"plane": ["S22", "S13"], "directions": 8}
+    output = {"fields": True, "pictures": False, "report": False}
+    result = run(case_of("generalized", MAX | ALONG, envelope=asked, output=output), comm, out=shared_path)
     if comm.rank == 0:
         with (shared_path / "envelope.csv").open() as stream:
             rows = list(csv.DictReader(stream))

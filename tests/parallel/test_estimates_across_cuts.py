@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX, make_case, solve
+from support.cases import case_of, make_case, solve
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.homogenization.mesh_estimate import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY
 
@@ -13,18 +13,14 @@ pytestmark = pytest.mark.parallel
 
 VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
 SPRINGS = {"normal_stiffness": 1000.0, "tangential_stiffness": 250.0, "contact": False}
+RTOL = {"feti_ksp_rtol": 1e-10}
 
 
 def estimate(comm, subdomains, plane="strain", cell=None, **sections):
     """Return the estimates of a hexagonal cell of so many subdomains.  Collective."""
-    document = {
-        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4} | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": plane},
-        "decomposition": {"cut": "bodies", "subdomains": subdomains},
-        "petsc": {"feti_ksp_rtol": 1e-10},
-    }
-    return run(Case.parse(document | sections), comm).mesh_error.effective_stiffness
+    cell = {"geometry": "hexagonal", "fibre_fraction": 0.4} | (cell or {})
+    sections = {"decomposition": {"cut": "bodies", "subdomains": subdomains}, "petsc": RTOL} | sections
+    return run(case_of(cell, plane=plane, **sections), comm).mesh_error.effective_stiffness
 
 
 def errors(comm, cell, cut, policy, **more):
@@ -83,16 +79,10 @@ def test_no_cut_changes_those_of_nearly_incompressible_phases(comm):
 def test_no_cut_moves_a_free_fibre(comm):
     """It may lie anywhere in its hole, turned by any angle."""
     free = {"contact": True, "debonded": [{"fibre": 1, "centre": 0.0, "angle": 360.0}]}
-    document = {
-        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.3, "mesh_size": 0.25},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "load", "plane": "strain"},
-        "load": {"to": {"E11": 0.01, "E22": -0.01}},
-        "interface": free,
-        "petsc": {"feti_ksp_rtol": 1e-10},
-    }
+    cell = {"geometry": "hexagonal", "fibre_fraction": 0.3, "mesh_size": 0.25}
+    sections = {"load": {"to": {"E11": 0.01, "E22": -0.01}}, "interface": free, "petsc": RTOL}
     whole, cut = (
-        run(Case.parse(document | {"decomposition": {"subdomains": n}}), on).load.mesh_error
+        run(case_of(cell, decomposition={"subdomains": n}, **sections), on).load.mesh_error
         for on, n in ((MPI.COMM_SELF, 3), (comm, 9))
     )
     assert abs(cut - whole) < 1e-8 * whole

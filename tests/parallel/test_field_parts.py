@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX
+from support.cases import case_of
 from support.ranks import parallel_assert
 
 from feti_homog import Case, run
@@ -27,15 +27,9 @@ CELLS = {
 @pytest.fixture(scope="module", params=CELLS)
 def computed(request: Any) -> Result:
     """Provide a cell in 7 pieces, half of each fibre debonded and in contact."""
-    document = {
-        "cell": CELLS[request.param],
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "angle", "plane": "strain"},
-        "interface": {"debonded": [{"fibre": "all"}]},
-        "angle": {"values": [180.0], "strain": [0.1, -0.05, 0.02]},
-        "decomposition": {"subdomains": 7},
-    }
-    return run(Case.parse(document), MPI.COMM_WORLD, fields=True)
+    sections = {"interface": {"debonded": [{"fibre": "all"}]}, "decomposition": {"subdomains": 7}}
+    case = case_of(CELLS[request.param], angle={"values": [180.0], "strain": [0.1, -0.05, 0.02]}, **sections)
+    return run(case, MPI.COMM_WORLD, fields=True)
 
 
 def test_both_faces_of_an_interface_node_are_nodes_of_the_mesh(comm: Any, computed: Result) -> None:

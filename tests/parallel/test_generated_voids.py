@@ -1,16 +1,13 @@
 """Cells whose voids the program meshes: against user's meshes, closed forms, other descriptions; their certificates."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from support.cases import MATRIX, case_of, monolithic_stiffness, relative_error, solve
 from support.generated_meshes import generate
 from support.ranks import assert_certified
 from support.void_cells import write_part
 
 from feti_homog import run
-from feti_homog.case import cases
 from feti_homog.mesh.arrange import arrange
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
@@ -24,18 +21,8 @@ def table(rows, **keys):
     return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | keys
 
 
-def _document(cell, plane="strain", fibre=True):
-    return {
-        "cell": cell,
-        "material": {"matrix": MATRIX} | ({"fibre": FIBRE} if fibre else {}),
-        "analysis": {"type": "stiffness", "plane": plane},
-        "petsc": {"feti_ksp_rtol": 1e-11},
-        "output": {"pictures": False},
-    }
-
-
-def solved(comm, cell, plane="strain", fibre=True, folder=Path(), out=None, **sections):
-    return run(cases.parse(_document(cell, plane, fibre) | sections, folder), comm, out=out)
+def solved(comm, cell, *given, out=None, **sections):
+    return run(case_of(cell, *given, **sections), comm, out=out)
 
 
 @pytest.mark.one_rank
@@ -43,7 +30,7 @@ def solved(comm, cell, plane="strain", fibre=True, folder=Path(), out=None, **se
 @pytest.mark.parametrize("decomposition", [{}, {"subdomains": 5}])
 def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, decomposition):
     """Both have the same nodes: the user's mesh has fibres, some of which are left out."""
-    case = cases.parse(_document(table([row | {"phase": "fibre"} for row in ROWS[:3]])), Path())
+    case = case_of(table([row | {"phase": "fibre"} for row in ROWS[:3]]))
     if comm.rank == 0:
         mesh = generate(case.cell)
         centres, number = mesh.points[mesh.triangles].mean(axis=1), mesh.precedence
@@ -66,7 +53,7 @@ def test_a_small_elliptic_void_softens_as_the_dilute_limit_says(comm, a, b):
     """
     row = {"x": 0.5, "y": 0.5, "a": a, "b": b, "phase": "void"}
     cell = table([row], mesh_size=0.2, interface_size=0.01, order=2)
-    L = solved(comm, cell, plane="stress", fibre=False).effective_stiffness
+    L = solved(comm, cell, plane="stress", material={"matrix": MATRIX}).effective_stiffness
     young, poisson = MATRIX["young"], MATRIX["poisson"]
     bare = np.array([[1.0, -poisson, 0.0], [-poisson, 1.0, 0.0], [0.0, 0.0, 2 * (1 + poisson)]]) / young
     more = np.array([[2 * b * b + a * b, -a * b, 0.0], [-a * b, 2 * a * a + a * b, 0.0], [0.0, 0.0, 2 * (a + b) ** 2]])
@@ -77,8 +64,8 @@ def test_a_small_elliptic_void_softens_as_the_dilute_limit_says(comm, a, b):
 @pytest.mark.parametrize("plane", ["strain", "stress", "generalized"])
 def test_voids_soften_and_their_cells_are_certified(comm, shared_path, plane):
     random = {"geometry": "random", "fibres": 5, "fibre_fraction": 0.3, "seed": 1, "mesh_size": 0.1}
-    whole = solved(comm, random, plane)
-    found = solved(comm, random | {"voids": 0.08, "void_radius": 0.5}, plane, out=shared_path / "run")
+    whole = solved(comm, random, plane=plane)
+    found = solved(comm, random | {"voids": 0.08, "void_radius": 0.5}, plane=plane, out=shared_path / "run")
     assert found.cell.porosity == pytest.approx(0.08, rel=0.1) and whole.cell.porosity == 0.0
     assert np.all(np.diag(found.effective_stiffness)[:2] < 0.9 * np.diag(whole.effective_stiffness)[:2])
     assert_certified(comm, shared_path / "run")
@@ -88,7 +75,6 @@ def test_voids_soften_and_their_cells_are_certified(comm, shared_path, plane):
 def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
     random = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "seed": 4, "mesh_size": 0.15, "voids": 0.05}
     sections = {
-        "analysis": {"type": "path", "plane": "strain"},
         "interface": {"normal_strength": 2.0, "tangential_strength": 2.0},
         "path": {"strain": [1.0, 0.0, 0.0]},
     }
@@ -100,11 +86,9 @@ def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
 @pytest.mark.one_rank
 def test_an_accuracy_counts_free_faces_of_voids():
     """With them a cell of hardly any contrast needs more."""
-    document = {"material": {"matrix": MATRIX, "fibre": MATRIX}, "analysis": {"type": "stiffness", "plane": "strain"}}
     asked = {"geometry": "table", "width": 1.0, "height": 1.0, "accuracy": 1e-3}
-    plain, void = (
-        cases.parse(document | {"cell": {"fibre_list": rows} | asked}, Path()) for rows in (ROWS[1:3], ROWS[:3])
-    )
+    alike = {"matrix": MATRIX, "fibre": MATRIX}
+    plain, void = (case_of(asked | {"fibre_list": rows}, material=alike) for rows in (ROWS[1:3], ROWS[:3]))
     assert void.cell.refine > plain.cell.refine == 0
 
 
@@ -112,6 +96,5 @@ def test_an_accuracy_counts_free_faces_of_voids():
 def test_hollow_fibres_have_the_monolithic_stiffness(comm):
     rows = [VOID, ROWS[1] | {"inner_radius": 0.15}, {"x": 0.0, "y": 0.5, "radius": 0.15, "inner_radius": 0.05}]
     for pieces in ({}, {"decomposition": {"subdomains": 6}}):
-        case = cases.parse(_document(table(rows, refine=1)) | pieces, Path())
-        torn, L, _ = solve(case, comm)
+        torn, L, _ = solve(case_of(table(rows, refine=1), **pieces), comm)
         assert relative_error(L, monolithic_stiffness(torn)) < 1e-9

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support import coated_cells
+from support import cases
 from support.ranks import assert_certified
+from support.void_cells import write_rings
 from unit.mesh.faulty_meshes import MATRIX, grid, node
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
@@ -28,20 +29,9 @@ OUTER, INNER = ["fibre:2", "matrix"], ["fibre", "fibre:2"]
 
 
 def case_of(folder, name, materials, interface, fields=False, **analysis):
-    (kind,) = analysis
-    sections = {} if interface is None else {"interface": interface}
-    return Case.parse(
-        {
-            "cell": {"geometry": "mesh", "file": f"{name}.msh"},
-            "material": dict(zip(("matrix", "fibre", "fibre:2"), materials, strict=False)),
-            "analysis": {"type": kind, "plane": "strain"},
-            "petsc": {"feti_ksp_rtol": 1e-11},
-            "output": {"pictures": False, "fields": fields},
-        }
-        | ({} if analysis[kind] is None else analysis)
-        | sections,
-        folder,
-    )
+    materials = dict(zip(("matrix", "fibre", "fibre:2"), materials, strict=False))
+    sections = {"material": materials, "interface": interface, "output": {"pictures": False, "fields": fields}}
+    return cases.case_of({"geometry": "mesh", "file": f"{name}.msh"}, folder, **sections, **analysis)
 
 
 @pytest.fixture
@@ -50,7 +40,7 @@ def meshes(comm, shared_path):
 
     def write():
         for name, core, ring in (("plain", "fibre", "fibre"), ("coated", *INNER), ("core", "fibre", "matrix")):
-            coated_cells.write(shared_path / f"{name}.msh", core, ring)
+            write_rings(shared_path / f"{name}.msh", core, ring)
 
     on_root(comm, write)
     return shared_path
@@ -149,15 +139,9 @@ def test_an_envelope_of_two_interfaces_tells_which_breaks_first(comm, shared_pat
     ]
 
     def onsets(chosen, out=None):
-        document = {
-            "cell": cell,
-            "material": material,
-            "analysis": {"type": "envelope", "plane": "strain"},
-            "interface": chosen,
-            "envelope": {"plane": ["S11", "S12"], "directions": 12},
-            "output": {"pictures": False},
-        }
-        return run(Case.parse(document), comm, out=out).envelope
+        envelope = {"plane": ["S11", "S12"], "directions": 12}
+        case = cases.case_of(cell, material=material, interface=chosen, envelope=envelope, petsc={})
+        return run(case, comm, out=out).envelope
 
     both, *each = onsets(sections, shared_path / "run"), *(onsets([section]) for section in sections)
     for point, *own in zip(both, *each, strict=True):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.stats import weibull_min
+from support import cases
 from support.ranks import PIECES, assert_certified
 
 from feti_homog import Case, run
@@ -30,24 +31,10 @@ ENVELOPE = {"plane": ["S11", "S12"], "directions": 8}
 
 def case_of(interface, rows, mesh_size=0.25, **analysis):
     """Return a case of three fibres; `rows` is what their table has beside circles."""
-    (kind,) = analysis
-    circles = [{"x": x, "y": y, "radius": 0.7} for x, y in CENTRES]
-    phases = {row.get("phase", "fibre") for row in rows}
-    return Case.parse(
-        {
-            "cell": {
-                "geometry": "table", "width": 4.0, "height": 4.0, "mesh_size": mesh_size,
-                "fibre_list": [circle | row for circle, row in zip(circles, rows, strict=True)],
-            },
-            "material": {"matrix": EPOXY} | dict.fromkeys(sorted(phases), GLASS),
-            "analysis": {"type": kind, "plane": "strain"},
-            "interface": interface,
-            "petsc": {"feti_ksp_rtol": 1e-11},
-            "decomposition": PIECES,
-            "output": {"pictures": False},
-        }
-        | analysis
-    )  # fmt: skip
+    fibres = [{"x": x, "y": y, "radius": 0.7} | row for (x, y), row in zip(CENTRES, rows, strict=True)]
+    cell = {"geometry": "table", "width": 4.0, "height": 4.0, "mesh_size": mesh_size, "fibre_list": fibres}
+    materials = {"matrix": EPOXY} | {fibre.get("phase", "fibre"): GLASS for fibre in fibres}
+    return cases.case_of(cell, material=materials, interface=interface, decomposition=PIECES, **analysis)
 
 
 def weibull(shape, seed, n=3):

@@ -10,7 +10,7 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 from support.cases import FIBRE, MATRIX, case_of, make_case, solve
 from support.users_meshes import polar_cell
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_estimate import energy_errors
@@ -35,8 +35,7 @@ def result(comm, geometry="hexagonal", phases=(MATRIX, FIBRE), plane="strain", *
     """Return the result of a stiffness; `more` are sections, of the cell keys beside its geometry.  Collective."""
     cell = {"geometry": geometry, "fibre_fraction": 0.4} | more.pop("cell", {})
     materials = dict(zip(("matrix", "fibre"), phases, strict=True))
-    document = {"cell": cell, "material": materials, "analysis": {"type": "stiffness", "plane": plane}}
-    return run(Case.parse(document | more), comm)
+    return run(case_of(cell, plane=plane, material=materials, **more), comm)
 
 
 @pytest.mark.one_rank
@@ -256,10 +255,8 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
 
 @pytest.mark.few_ranks  # estimates of cut bodies are those of their pieces
 def test_what_the_elements_have_of_it_is_a_field_of_every_state(comm):
-    materials = {"matrix": MATRIX, "fibre": FIBRE}
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2, "order": 2, "refine": 1}}
-    document |= {"material": materials, "analysis": {"type": "stiffness", "plane": "stress"}}
-    found = run(Case.parse(document), comm, fields=True)
+    cell = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2, "order": 2, "refine": 1}
+    found = run(case_of(cell, plane="stress"), comm, fields=True)
     for k, state in enumerate(found.fields.states):
         share = comm.allreduce(float(state.mesh_error.sum()))
         # All but what curved sides make of arcs.
@@ -281,9 +278,8 @@ def test_states_of_other_analyses_have_theirs(comm, kind):
         "envelope": {"plane": ["S11", "S22"], "directions": 4},
     }
     size = 0.025 if kind == "load" else 0.05  # errors of elements and arcs cancel on the coarser mesh
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": size}, "interface": interface}
-    document |= {"material": {"matrix": MATRIX, "fibre": FIBRE}, "analysis": {"type": kind, "plane": "strain"}}
-    result = run(Case.parse(document | {kind: asked[kind]}), comm)
+    cell = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": size}
+    result = run(case_of(cell, interface=interface, **{kind: asked[kind]}), comm)
     if kind == "envelope":
         assert 0 < result.mesh_error.energy < 0.01
         return

@@ -5,11 +5,11 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from petsc4py import PETSc
-from support import torn_cells
+from support import cases, torn_cells
 from support.cases import relative_error
 from support.ranks import PIECES, parallel_assert
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.contact_problem import ContactProblem
@@ -38,20 +38,18 @@ STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
 def case_of(bonds, axes, temperature):
     """Return an envelope in eight directions of two axes."""
     cooling = {"temperature": temperature} if temperature else {}
-    return Case.parse(
-        {
-            "cell": {"geometry": "random", "fibres": 2, "min_gap": 0.1, "seed": 1, "radius_spread": 0.3,
-                     "fibre_fraction": 0.4, "mesh_size": 0.3},
-            "material": {
-                "matrix": {"young": 3.0, "poisson": 0.35, "expansion": 6e-5},
-                "fibre": {"young": 70.0, "poisson": 0.2, "expansion": 5e-6},
-            },
-            "analysis": {"type": "envelope", "plane": "generalized"},
-            "interface": bonds,
-            "envelope": {"plane": list(axes), "directions": 8} | cooling,
-            "petsc": {"feti_ksp_rtol": 1e-12, "feti_pc_type": "influence"},
-            "decomposition": PIECES,
-        }
+    return cases.case_of(
+        {"geometry": "random", "fibres": 2, "min_gap": 0.1, "seed": 1, "radius_spread": 0.3, "fibre_fraction": 0.4,
+         "mesh_size": 0.3},
+        plane="generalized",
+        material={
+            "matrix": {"young": 3.0, "poisson": 0.35, "expansion": 6e-5},
+            "fibre": {"young": 70.0, "poisson": 0.2, "expansion": 5e-6},
+        },
+        interface=bonds,
+        envelope={"plane": list(axes), "directions": 8} | cooling,
+        petsc={"feti_ksp_rtol": 1e-12, "feti_pc_type": "influence"},
+        decomposition=PIECES,
     )  # fmt: skip
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, case_of
 from support.ranks import write_once
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.materials import voigt
 from feti_homog.report.text import summary
 
@@ -22,17 +22,13 @@ AXES = {"axial_tension": 40.0, "axial_compression": 25.0, "axial_shear": 20.0, "
 MEASURES = ("principal", "von_mises", "hydrostatic", "utilisation")
 
 
-def result_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), **more):
+def result_of(comm, load, order=1, plane="generalized", fibre=FIBRE, strengths=(None, None), cell=CELL, **more):
     materials = {
         name: material if limit is None else material | {"strength": limit}
         for (name, material), limit in zip({"matrix": MATRIX, "fibre": fibre}.items(), strengths, strict=True)
     }
-    document = {
-        "cell": CELL | {"order": order},
-        "material": materials,
-        "analysis": {"type": "load", "plane": plane},
-    } | ({"load": {"to": load}} if load else {})
-    return run(Case.parse(document | more), comm, fields=True)
+    sections = {"material": materials, "load": {"to": load} if load else None, "petsc": {}} | more
+    return run(case_of({"order": order} | cell, plane=plane, **sections), comm, fields=True)
 
 
 def phases_of(*of_run, **more):
@@ -130,12 +126,7 @@ def test_all_ranks_find_values_and_positions_of_one(comm):
 
 def test_stresses_rise_beside_tips_and_corners(comm):
     def remarks(cell, **more):
-        document = {
-            "cell": cell,
-            "material": {"matrix": MATRIX, "fibre": FIBRE},
-            "analysis": {"type": "stiffness", "plane": "strain"},
-        }
-        return " ".join(run(Case.parse(document | more), comm, fields=True).remarks)
+        return " ".join(run(case_of(cell, **more), comm, fields=True).remarks)
 
     arc = {"interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}]}}
     assert "beside tips of debonding rise without limit with finer elements" in remarks(CELL, **arc)
@@ -156,13 +147,8 @@ def test_only_tips_in_one_rigid_interface_raise_stresses(comm):
     springs = {"normal_stiffness": 100.0, "tangential_stiffness": 100.0}
     for angle, bond, has_tips in ((360.0, {}, False), (90.0, {}, True), (90.0, springs, False)):
         inside = {"between": ["fibre", "coating"], "debonded": [{"fibre": "all", "angle": angle}]} | bond
-        document = {
-            "cell": cell,
-            "material": materials,
-            "analysis": {"type": "stiffness", "plane": "strain"},
-            "interface": [inside, {"between": ["coating", "matrix"], "debonded": []}],
-        }
-        remarks = " ".join(run(Case.parse(document), comm, fields=True).remarks)
+        bonds = [inside, {"between": ["coating", "matrix"], "debonded": []}]
+        remarks = " ".join(run(case_of(cell, material=materials, interface=bonds), comm, fields=True).remarks)
         assert ("beside tips of debonding" in remarks) == has_tips, remarks
 
 
@@ -217,7 +203,7 @@ def test_a_path_says_where_a_phase_passes_its_strength_before_the_peak(comm):
     matrix = {"matrix": MATRIX | {"strength": {"tension": 4.0, "compression": 6.0}}, "fibre": FIBRE}
     alone = result_of(comm, {"E11": 1e-3, "E22": 0.0, "gamma12": 0.0}, plane="strain", material=matrix)
     factor, (S11, *_) = factors(alone)["matrix"], alone.load.stress
-    path = {"analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.2, 0.0, 0.0]}, "material": matrix}
+    path = {"path": {"strain": [0.2, 0.0, 0.0]}, "material": matrix}
     for strength, passes in ((10.0, True), (1.0, False)):
         more = {"interface": {"normal_strength": strength, "tangential_strength": strength}}
         said = " ".join(result_of(comm, None, plane="strain", **path, **more).remarks)

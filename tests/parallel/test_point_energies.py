@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from reference.closed_forms import bulk_and_shear
 from reference.references import GLASS_EPOXY_DISSIPATED, GLASS_EPOXY_ONSET
+from support.cases import case_of
 from support.ranks import PIECES, write_once
 from unit.mesh.faulty_meshes import grid
 
@@ -25,18 +26,8 @@ LEGS = [[0.03, 0.002, 0.01], [0.0, 0.0, 0.0], [-0.01, 0.02, 0.03]]
 
 def path_of(cell: dict[str, Any], interface: dict[str, Any], folder: Any = ".", **path: Any) -> Case:
     output = {"fields": False, "pictures": False, "states": path.pop("states", "all")}
-    return Case.parse(
-        {
-            "cell": cell,
-            "material": PHASES,
-            "analysis": {"type": "path", "plane": "strain"},
-            "interface": interface,
-            "path": path,
-            "output": output,
-            "decomposition": PIECES,
-        },
-        folder,
-    )
+    more = {"output": output, "decomposition": PIECES}
+    return case_of(cell, folder, material=PHASES, interface=interface, path=path, petsc={}, **more)
 
 
 @pytest.mark.parametrize("growth", ["springs", "released"])

@@ -71,7 +71,6 @@ def test_turned_cells_have_turned_stiffnesses(comm):
 @pytest.mark.one_rank
 def test_polygons_debond_and_are_certified(comm, shared_path):
     sections = {
-        "analysis": {"type": "path", "plane": "strain"},
         "interface": {"normal_strength": 2.0, "tangential_strength": 2.0},
         "path": {"strain": [1.0, 0.0, 0.0], "max_events": 200},
     }

@@ -5,10 +5,10 @@ They are compared with differences of the stored energy, and with the exact solu
 
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, case_of
 from support.ranks import parallel_assert
 
-from feti_homog import Case, run
+from feti_homog import run
 
 pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
@@ -25,15 +25,9 @@ STEP = 0.5
 
 def loaded(comm, load, opening, bond, centre=20.0, materials=PHASES, **cell):
     """Return the point under a load, and the area of the cell."""
-    document = {
-        "cell": SQUARE | cell,
-        "material": materials,
-        "analysis": {"type": "load", "plane": "generalized"},
-        "interface": {"debonded": [{"fibre": 1, "angle": opening, "centre": centre}]} | bond,
-        "load": {"to": load},
-        "petsc": {"feti_ksp_rtol": 1e-10},
-    }
-    result = run(Case.parse(document), comm)
+    bonds = {"debonded": [{"fibre": 1, "angle": opening, "centre": centre}]} | bond
+    sections = {"material": materials, "interface": bonds, "load": {"to": load}}
+    result = run(case_of(SQUARE | cell, plane="generalized", **sections), comm)
     return result.load, result.cell.area
 
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from support import torn_cells
+from support.cases import case_of
 from support.loads import strains
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.dual_solution import ActiveJumps
 from feti_homog.feti.exact.exact_inverse import ExactInverse
@@ -34,22 +35,17 @@ SPRINGS = {"criterion": "energy", "normal_stiffness": 20.0, "tangential_stiffnes
 
 def two_inclusions(softness, stiff, soft, unit=1.0, young=10.0, **analysis):
     """Return a stiff and a soft fibre, with the interfaces `stiff` and `soft`; `unit` is that of their moduli."""
-    (kind,) = analysis
-    return Case.parse(
-        {
-            "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.2, "fibre_list": FIBRES},
-            "material": {
-                "matrix": {"young": unit, "poisson": 0.3},
-                "fibre": {"young": young * unit, "poisson": 0.2},
-                "fibre:2": {"young": young * softness * unit, "poisson": 0.2},
-            },
-            "interface": [stiff | {"between": ["matrix", "fibre"]}, soft | {"between": ["matrix", "fibre:2"]}],
-            "analysis": {"type": kind, "plane": "strain"},
-            # The reference cell is made anew, so that rows come back to it.
-            "petsc": {"feti_influence_columns": 10},
-            "output": {"fields": False, "pictures": False},
-        }
-        | analysis
+    return case_of(
+        {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.2, "fibre_list": FIBRES},
+        material={
+            "matrix": {"young": unit, "poisson": 0.3},
+            "fibre": {"young": young * unit, "poisson": 0.2},
+            "fibre:2": {"young": young * softness * unit, "poisson": 0.2},
+        },
+        interface=[stiff | {"between": ["matrix", "fibre"]}, soft | {"between": ["matrix", "fibre:2"]}],
+        petsc={"feti_influence_columns": 10},  # the reference cell is made anew, so that rows come back to it
+        output={"fields": False, "pictures": False},
+        **analysis,
     )
 
 
@@ -116,16 +112,14 @@ def test_a_component_far_softer_than_another_carries_its_stress(comm, bonded):
 
 def loaded_along(bonded):
     """Return a uniform cell, with its fibre glued or bonded, under stresses that are far apart."""
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.3},
-        "material": {"matrix": STIFF_ALONG, "fibre": STIFF_ALONG},
-        "analysis": {"type": "load", "plane": "generalized"},
-        "load": {"to": {"S11": 1e6, "S12": 0.01, "E22": 0.0, "S33": 0.03}},
-        "output": {"fields": False, "pictures": False},
-    }
-    if not bonded:
-        document["interface"] = {"debonded": []}
-    return Case.parse(document)
+    return case_of(
+        {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.3},
+        plane="generalized",
+        material={"matrix": STIFF_ALONG, "fibre": STIFF_ALONG},
+        load={"to": {"S11": 1e6, "S12": 0.01, "E22": 0.0, "S33": 0.03}},
+        interface=None if bonded else {"debonded": []},
+        petsc={},
+    )
 
 
 def test_a_stress_that_is_missed_beside_a_far_larger_one_is_no_result(comm, monkeypatch):

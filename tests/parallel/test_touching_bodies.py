@@ -13,11 +13,11 @@ from reference.dense_feti import DenseDual, gathered, matrix
 from reference.touching_bodies import TouchingBodies
 from scipy.linalg import null_space
 from support import torn_cells
-from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
+from support.cases import FIBRE, MATRIX, case_of, make_case, monolithic_stiffness, relative_error, solve
 from support.pixel_images import SYMMETRIES, pixel_mesh, random_image, turned
 from unit.mesh.faulty_meshes import MshFile
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.materials.laws import plane_stiffness
@@ -102,16 +102,9 @@ def debonded_lines(mesh: MshFile, share: float = 0.6) -> list[tuple[int, int]]:
 def loaded(comm: Any, path: Any, mesh: MshFile, strain: np.ndarray, springs: dict[str, float]) -> tuple[Any, Any]:
     """Sigma under a strain, with debonded lines that touch or not, and the result.  Collective."""
     load = dict(zip(("E11", "E22", "gamma12"), strain.tolist(), strict=True))
-    document = {
-        "cell": cell_of(comm, path, mesh.with_curve(debonded_lines(mesh))),
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "load", "plane": "strain"},
-        "load": {"to": load},
-        "interface": springs,
-        "petsc": {"feti_ksp_rtol": 1e-10},
-        "output": {"pictures": False},
-    }
-    result = run(Case.parse(document), comm, out=path / "out")
+    cell = cell_of(comm, path, mesh.with_curve(debonded_lines(mesh)))
+    case = case_of(cell, load={"to": load}, interface=springs, petsc={"feti_ksp_rtol": 1e-10})
+    result = run(case, comm, out=path / "out")
     return np.array(result.load.stress), result
 
 
@@ -154,13 +147,9 @@ def test_debonded_bodies_that_touch_are_in_equilibrium(comm: Any, shared_path: A
 @pytest.mark.parametrize("kind", KINDS)
 def test_results_of_every_kind_obey_their_laws(comm: Any, shared_path: Any, kind: str):
     sections = dict(KINDS[kind])
-    document = {
-        "cell": cell_of(comm, shared_path, pixel_mesh(random_image(8, 2)), **sections.pop("cell", {})),
-        "material": {"matrix": MATRIX | {"expansion": 2e-5}, "fibre": FIBRE | {"expansion": 5e-6}},
-        "analysis": {"type": kind, "plane": sections.pop("plane", "strain")},
-        "output": {"pictures": False},
-    }
-    result = run(Case.parse(document | sections), comm, out=shared_path / "out")
+    cell = cell_of(comm, shared_path, pixel_mesh(random_image(8, 2)), **sections.pop("cell", {}))
+    materials = {"matrix": MATRIX | {"expansion": 2e-5}, "fibre": FIBRE | {"expansion": 5e-6}}
+    result = run(case_of(cell, material=materials, petsc={}, **sections), comm, out=shared_path / "out")
     certificate = on_root(comm, verify, shared_path / "out")
     assert result.status == "done" and certificate.holds, certificate.text
 
@@ -169,14 +158,10 @@ def test_results_of_every_kind_obey_their_laws(comm: Any, shared_path: Any, kind
 def test_tips_do_not_cross_voids(comm: Any, shared_path: Any):
     """A fibre's side at a void ends at interface nodes, and is no interface."""
     image = random_image(8, 208, 0.5, 2, 0.1)
-    document = {
-        "cell": cell_of(comm, shared_path, pixel_mesh(image), voids=True),
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "path", "plane": "strain"},
-        "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02},
-        "path": {"strain": [0.06, 0.0, 0.02], "method": "increments", "increments": 2},
-    }
-    run(Case.parse(document), comm, out=shared_path / "out")
+    cell = cell_of(comm, shared_path, pixel_mesh(image), voids=True)
+    bonds = SPRINGS | {"criterion": "energy", "toughness": 0.02}
+    path = {"strain": [0.06, 0.0, 0.02], "method": "increments", "increments": 2}
+    run(case_of(cell, interface=bonds, path=path, petsc={}), comm, out=shared_path / "out")
     certificate = on_root(comm, verify, shared_path / "out")
     assert certificate.holds, certificate.text
 

@@ -10,11 +10,11 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX
+from support.cases import case_of
 from support.ranks import parallel_assert
 from support.sample_output import part_of, sample, without_interface
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.results import xdmf
 from feti_homog.results.field_file import FieldFile
 
@@ -27,12 +27,11 @@ SPACE = {"S23": "column/state/K/S23", "S13": "column/state/K/S13"}
 SPACE_POINTS = {"traction_a": "state/K/axial_traction", "jump_a": "state/K/axial_jump"}
 CASES: dict[str, dict[str, Any]] = {
     "angle": {
-        "analysis": {"type": "angle", "plane": "strain"},
         "interface": {"debonded": [{"fibre": "all"}]},
         "angle": {"values": [0, 90], "strain": STRAIN},
     },
     "space": {
-        "analysis": {"type": "stiffness", "plane": "generalized"},
+        "plane": "generalized",
         "interface": {"debonded": [{"fibre": "all", "centre": 0.0, "angle": 90.0}], "contact": False},
     },
 }
@@ -52,13 +51,8 @@ def written(comm: Any, directory: Path, order: int) -> Path:
 
 def computed(comm: Any, directory: Path, name: str) -> Path:
     """Return a tiny cell."""
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25, "order": 2 if name == "angle" else 1},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "output": {"pictures": False},
-        "decomposition": {"subdomains": 4},
-    }
-    run(Case.parse(document | CASES[name]), comm, out=directory)
+    cell = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25, "order": 2 if name == "angle" else 1}
+    run(case_of(cell, decomposition={"subdomains": 4}, **CASES[name]), comm, out=directory)
     return directory
 
 

@@ -86,7 +86,6 @@ def test_files_are_certified_and_what_is_reported_of_voids_is_checked(comm, shar
 def test_an_envelope_beside_voids_is_certified(comm, shared_path):
     write(comm, shared_path, voids=[0, 1], **RANDOM)
     sections = {
-        "analysis": {"type": "envelope", "plane": "strain"},
         "interface": {"normal_strength": 5.0, "tangential_strength": 5.0},
         "envelope": {"plane": ["S22", "S12"], "directions": 6},
     }

@@ -35,12 +35,17 @@ def make_case(
     return cases.parse(document, Path(folder))
 
 
-def case_of(cell, folder=".", **sections):
-    """Return the stiffness of this cell section as a case, with other sections in place of the usual ones."""
+def case_of(cell, folder=".", plane="strain", **sections):
+    """Return a case of this cell section, with other sections, unless None, in place of the usual ones.
+
+    The section of an analysis, such as `path`, chooses it; without one it is the stiffness.
+    """
+    sections = {name: section for name, section in sections.items() if section is not None}
+    kinds = [name for name in ("path", "load", "angle", "envelope") if name in sections]
     document = {
         "cell": cell,
         "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
+        "analysis": {"type": (kinds or ["stiffness"])[0], "plane": plane},
         "petsc": {"feti_ksp_rtol": 1e-11},
         "output": {"pictures": False},
     }

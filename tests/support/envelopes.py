@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
@@ -17,7 +17,7 @@ from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.system.petsc.options_database import case_options
 from feti_homog.system.runtime.standard_streams import Progress
-from support import torn_cells
+from support import cases, torn_cells
 from support.loads import strains
 from support.ranks import PIECES
 
@@ -25,22 +25,17 @@ TIGHT = {"feti_ksp_rtol": 1e-12}
 MAX = {"normal_strength": 3.0, "tangential_strength": 2.0}
 QUADRATIC = MAX | {"criterion": "quadratic"}
 ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005}
-ISOTROPIC = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 
 
-def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) -> dict[str, Any]:
-    """Return a small cell with these bonds; `sections` replace those here."""
+def case_of(plane: str, interface: dict[str, Any], folder: Path = Path(), **sections: dict[str, Any]) -> Any:
+    """Return a case of a small cell with these bonds; `sections` replace those here."""
     base = {
         "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2},
-        "material": ISOTROPIC,
-        "analysis": {"plane": plane},
-        "interface": interface,
         "output": {"fields": False, "pictures": False},
         "petsc": TIGHT,
         "decomposition": PIECES,
     }
-    own = {"analysis", "output", "petsc"}  # the others are replaced as a whole
-    return base | {name: ({**base[name], **c} if name in own else c) for name, c in sections.items()}
+    return cases.case_of(folder=folder, plane=plane, interface=interface, **base | sections)
 
 
 def envelope(
@@ -53,8 +48,7 @@ def envelope(
     **own: Any,
 ) -> Any:
     """Return the result of an envelope. Collective."""
-    both = (sections or {}) | {"analysis": {"type": "envelope"}, "envelope": {"plane": list(axes)} | own}
-    return run(Case.parse(document(plane, interface, **both), folder), comm)
+    return run(case_of(plane, interface, folder, envelope={"plane": list(axes)} | own, **sections or {}), comm)
 
 
 @contextmanager
@@ -65,10 +59,10 @@ def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> I
     """
     PETSc.garbage_cleanup(comm)
     if plane == "generalized":
-        more = {"analysis": {"type": "envelope"}, "envelope": {"plane": ["E11", "E22"]}}
+        sections["envelope"] = {"plane": ["E11", "E22"]}
     else:
-        more = {"analysis": {"type": "path"}, "path": {"strain": [1.0, 0.0, 0.0]}}
-    case = Case.parse(document(plane, interface, **more, **sections))
+        sections["path"] = {"strain": [1.0, 0.0, 0.0]}
+    case = case_of(plane, interface, **sections)
     with case_options(case.petsc):
         cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
         yield cell

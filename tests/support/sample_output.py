@@ -18,6 +18,7 @@ from feti_homog.results.field_layout import (
     rows_of,
     tables,
 )
+from feti_homog.results.result_json import SCHEMA
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 
@@ -193,3 +194,12 @@ def _cut(state: StatePart, nodes: Any, rows: Any, owned: Any) -> StatePart:
     chosen = {"n": nodes, "m": rows, "k": owned}
     parts = {name: getattr(state, name)[chosen[rows_of(d)]] for name, d in tables(state).items()}
     return replace(state, **parts)
+
+
+def path_of(strains: list[float]) -> dict[str, Any]:
+    """Return the document of a path whose points have these strains E11."""
+    counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
+    points = [counts | {"load_factor": abs(e), "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in strains]
+    section = {"strain": [1.0, 0.0, 0.0], "method": "events"}
+    case = {"analysis": {"type": "path", "plane": "strain"}, "interface": {"contact": True}, "path": section}
+    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, "path": points}

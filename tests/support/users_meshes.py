@@ -8,6 +8,7 @@ import numpy as np
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
+from feti_homog.mesh.tiles.tile_filling import gmsh_session
 from support.subdomains import cut
 
 
@@ -60,6 +61,19 @@ def polar_cell(
         gmsh.write(str(path))
     finally:
         gmsh.finalize()
+
+
+def converted(source: Path, target: Path, parts: int = 0, **options: float) -> Path:
+    """Return the file that gmsh makes of another one, with these options of Mesh, in so many partitions."""
+    with gmsh_session() as session:
+        session.open(str(source))
+        if parts:
+            session.option.setNumber("Mesh.PartitionCreatePhysicals", 0)
+            session.model.mesh.partition(parts)
+        for name, value in options.items():
+            session.option.setNumber(f"Mesh.{name}", value)
+        session.write(str(target))
+    return target
 
 
 def waved(points: np.ndarray, wave: float) -> np.ndarray:

@@ -1,9 +1,10 @@
-"""Meshes with voids: cells of the program with some fibres left out, as files that a user brings."""
+"""Meshes of cells of the program as files that a user brings, with some fibres left out or phases renamed."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from unit.mesh.faulty_meshes import MshFile
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.mesh.coarse_mesh import CoarseMesh
@@ -23,17 +24,17 @@ def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
     write_part(path, mesh, kept)
 
 
-def write_part(path: Path, mesh: CoarseMesh, kept: Bool) -> None:
-    """Write the file of the triangles of a mesh that are `kept` (m,)."""
-    triangles, phase = mesh.triangles[kept], mesh.phase[kept]
-    names = [f'2 {number + 1} "{name}"' for number, name in enumerate(mesh.phases) if (phase == number).any()]
-    used = np.unique(triangles)
-    nodes = [f"{n + 1} {mesh.points[n, 0]!r} {mesh.points[n, 1]!r} 0" for n in used.tolist()]
-    nodes = [line.replace("np.float64(", "").replace(")", "") for line in nodes]
-    elements = [
-        f"{k + 1} 2 2 {p + 1} {p + 1} {a + 1} {b + 1} {c + 1}"
-        for k, (p, (a, b, c)) in enumerate(zip(phase.tolist(), triangles.tolist(), strict=True))
-    ]
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names)), *names]
-    lines += ["$EndPhysicalNames", "$Nodes", str(len(nodes)), *nodes, "$EndNodes", "$Elements", str(len(elements))]
-    path.write_text("\n".join([*lines, *elements, "$EndElements", ""]))
+def write_part(path: Path, mesh: CoarseMesh, kept: Bool, phases: Sequence[str] = ()) -> None:
+    """Write the file of the triangles of a mesh that are `kept` (m,), with other names of its phases, if given."""
+    tags = {name: tag for tag, name in enumerate(dict.fromkeys(phases or mesh.phases), start=1)}
+    physical = [tags[(phases or mesh.phases)[k]] for k in mesh.phase[kept]]
+    corners = (mesh.triangles[kept] + 1).tolist()
+    elements = {k + 1: (2, tag, tag, tuple(corners[k])) for k, tag in enumerate(physical)}
+    nodes = {n: (*mesh.points[n - 1], 0.0) for n in np.unique(corners).tolist()}
+    MshFile(nodes, elements, {tag: name for name, tag in tags.items() if tag in physical}).write(path)
+
+
+def write_rings(path: Path, core: str, ring: str) -> None:
+    """Write the mesh of a square cell whose fibre has the phase `core`, and `ring` in a ring around it."""
+    mesh = generate(Cell(geometry="square", fibre_fraction=0.2, coating=0.4, mesh_size=0.12), {})
+    write_part(path, mesh, mesh.phase >= 0, [{"fibre": core, "coating": ring}.get(name, name) for name in mesh.phases])

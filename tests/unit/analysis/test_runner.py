@@ -1,4 +1,4 @@
-"""The torn cell and the results folder after a run that ends early."""
+"""The torn cell and the folder of a run that ends early, options of a result, and the line on a load that falls."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import make_case
+from support.cases import case_of, make_case
 
 from feti_homog.analysis import runner
 from feti_homog.errors import CaseError, ConvergenceError
@@ -62,3 +62,29 @@ def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
     with pytest.raises(CaseError, match="cannot be made"):
         runner.run(case, Path("/proc/results"), Progress(MPI.COMM_SELF, quiet=True))
     assert len(held) == 1
+
+
+@pytest.mark.parametrize("to", [{"S22": 100.0}, {"S11": -1.0, "S22": 90.0}, {"E22": 0.01}])
+def test_a_load_that_falls_from_its_largest_value_has_one_line(to, tmp_path, monkeypatch):
+    cohesive = {"law": "bilinear", "normal_stiffness": 1e5, "tangential_stiffness": 1e5, "normal_toughness": 0.02}
+    cohesive |= {"normal_strength": 60.0, "tangential_strength": 85.0, "tangential_toughness": 0.04}
+    case = case_of(
+        {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15},
+        material={"matrix": {"young": 4e3, "poisson": 0.35}, "fibre": {"young": 7e4, "poisson": 0.2}},
+        interface=cohesive,
+        path={"to": to, "max_events": 100},
+    )
+    lines = []
+    monkeypatch.setattr(Progress, "say", lambda self, line: lines.append(line))
+    result = runner.run(case, tmp_path / "out", Progress(MPI.COMM_SELF, True))
+    printed = [line for line in lines if "largest value so far" in line]
+    if "E22" in to:  # the strain prescribes where the path ends
+        assert printed == [] and not any("jumps" in line for line in result.remarks)
+        return
+    load = [point.load_factor for point in result.path]
+    first = next(k for k in range(len(load)) if load[k] < 0.95 * max(load[: k + 1]))
+    top = max(result.path[:first], key=lambda point: point.load_factor)
+    (line,) = printed
+    place = f"at {top.load_factor:.6f}, E22 {top.strain[1]:.4g}, S22 {top.stress[1]:.4g}"
+    assert f"{place}; the path ends at load factor 1" in line and "prescribed strain" in line
+    assert f"[path] under a load that only rises, the strain jumps {place}" in result.remarks

@@ -66,6 +66,7 @@ FAULTY_CASES = {
     }),
     **faults(changed(MESH_CELL), {
         "[cell] interface_size = 0.01": 'belongs to geometry = "square" or "hexagonal" or "random" or "table", not',
+        '[cell] boundary = "free"': 'expected one of "periodic", "displacement", "traction"',
         '[cell] file = "none.msh"': "no such file",
         '[cell] file = "cell.geo"': "expected the name of a .msh, .inp, .vtu, .vtk or .mesh file",
     }),
@@ -102,6 +103,11 @@ FAULTY_CASES = {
     "[cell] fibres: missing; expected an integer": cell('"hexagonal"', '"random"'),
     '[cell] fibre_fraction = 0.5: expected less than 0.4031 for geometry = "random": no circles min_gap apart are':
         changed(('geometry = "hexagonal"\n', RANDOM + "min_gap = 0.5\n"), ("= 0.4", "= 0.5")),
+    '[cell] boundary = "traction": belongs to [analysis] type = "stiffness" or "conductivity", not "path"':
+        changed(MESH_CELL, ("[material.m", 'boundary = "traction"\n[material.m'), ('"stiffness"', '"path"'),
+                end="[path]\nstrain = [0.1, 0.0, 0.0]\n"),
+    '[cell] boundary: excludes repair = "snap" and smooth = true, whose sides match':
+        changed(MESH_CELL, ("[material.m", 'boundary = "displacement"\nrepair = "snap"\n[material.m')),
     "[cell] file: missing; expected the name of a .msh, .inp, .vtu, .vtk or .mesh file":
         cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"'),
     '[cell] fibre_fraction = 0.4: belongs to geometry = "square" or "hexagonal" or "random", not':

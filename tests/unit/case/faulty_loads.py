@@ -3,9 +3,6 @@
 from support.base_case import AXIAL, FIBRE, TRANSVERSE, faults
 from unit.case.faulty_bonding import ARC, PATH, of_type
 
-IN_SPACE = '[analysis] plane = "generalized", not "strain"'
-TABLE = "expected a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}"
-
 
 def path(*lines: str, state: str = "strain") -> str:
     return of_type("path", "[path]", *lines).replace('"strain"', f'"{state}"')

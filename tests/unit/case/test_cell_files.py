@@ -1,9 +1,11 @@
 """Files of a cell: the size that it or the case gives, links in a circle and folders."""
 
+from pathlib import Path
+
 import pytest
+from support import cases
 from support.base_case import BASE, MESH_CELL
 
-from feti_homog import Case
 from feti_homog.case.cases import load
 from feti_homog.errors import CaseError
 
@@ -62,24 +64,16 @@ def test_the_digest_is_that_of_the_table(tmp_path):
 
 
 CELLS = {"file": {"geometry": "table", "file": "loop.csv"}, "match": {"geometry": "random", "match": "loop.csv"}}
-MATERIAL = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}}
-
-
-def parse(key):
-    Case.parse({"cell": CELLS[key], "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}})
 
 
 @pytest.mark.parametrize("key", CELLS)
-def test_links_in_a_circle_are_no_file(key, tmp_path, monkeypatch):
-    (tmp_path / "loop.csv").symlink_to("loop.csv")
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [(lambda path: path.symlink_to("loop.csv"), "no such file"), (Path.mkdir, "a folder; expected a file at /")],
+    ids=["a link in a circle", "a folder"],
+)
+def test_what_is_no_file(key, make, words, tmp_path, monkeypatch):
+    make(tmp_path / "loop.csv")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": no such file'):
-        parse(key)
-
-
-@pytest.mark.parametrize("key", CELLS)
-def test_a_folder_is_no_file(key, tmp_path, monkeypatch):
-    (tmp_path / "loop.csv").mkdir()
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": a folder; expected a file at /'):
-        parse(key)
+    with pytest.raises(CaseError, match=rf'^\[cell\] {key} = "loop.csv": {words}'):
+        cases.case_of(CELLS[key])

@@ -1,10 +1,9 @@
 """Coatings in a case file, and their faults."""
 
-from pathlib import Path
-
 import pytest
+from support import cases
 
-from feti_homog.case.cases import Case, parse
+from feti_homog.case.cases import Case
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 
@@ -14,8 +13,7 @@ BARE = {"geometry": "square", "fibre_fraction": 0.5}
 
 
 def case_of(cell: dict, *phases: str) -> Case:
-    materials = {phase: MATERIAL for phase in ("matrix", "fibre", *phases)}
-    return parse({"cell": cell, "material": materials, "analysis": {"type": "stiffness", "plane": "strain"}}, Path())
+    return cases.case_of(cell, material=dict.fromkeys(["matrix", "fibre", *phases], MATERIAL))
 
 
 def listed(*coatings: float | None, **cell: object) -> dict:

@@ -1,12 +1,10 @@
 """The coarse mesh and its refinement that an accuracy chooses."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import cases
 
-from feti_homog.case import cases
 from feti_homog.case.cell_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
 from feti_homog.materials.material_forms import Isotropic, TransverselyIsotropic
 
@@ -25,12 +23,8 @@ GEOMETRIES = {
 
 def case_of(young=70.0, geometry="hexagonal", matrix=MATRIX, bonding=None, plane="strain", **cell):
     names = GEOMETRIES[geometry].get("mix", ["fibre"])
-    document = {
-        "cell": GEOMETRIES[geometry] | cell,
-        "material": {"matrix": matrix} | {name: {"young": young, "poisson": 0.2} for name in names},
-        "analysis": {"type": "stiffness", "plane": plane},
-    }
-    return cases.parse(document | ({} if bonding is None else {"interface": bonding}), Path())
+    materials = {"matrix": matrix} | {name: {"young": young, "poisson": 0.2} for name in names}
+    return cases.case_of(GEOMETRIES[geometry] | cell, plane=plane, material=materials, interface=bonding)
 
 
 def splits(*arguments, **more):

@@ -3,11 +3,11 @@
 import math
 from fractions import Fraction
 from itertools import product
-from pathlib import Path
 
 import pytest
+from support import cases
 
-from feti_homog.case.cases import Case, parse
+from feti_homog.case.cases import Case
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.cell_sizes import fibre_counts, mixed_width
 from feti_homog.errors import CaseError
@@ -17,14 +17,9 @@ RADII = {"glass": 6.0, "carbon": 3.5}
 PHASE = {"young": 70.0, "poisson": 0.2}
 
 
-def document_of(*phases: str, **cell: object) -> dict:
-    materials = {phase: PHASE for phase in ("matrix", *phases)}
-    section = {"geometry": "random", "mesh_size": 0.1} | cell
-    return {"cell": section, "material": materials, "analysis": {"type": "stiffness", "plane": "strain"}}
-
-
 def case_of(*phases: str, **cell: object) -> Case:
-    return parse(document_of(*(phases or ("glass", "carbon")), **cell), Path())
+    materials = dict.fromkeys(["matrix", *(phases or ("glass", "carbon"))], PHASE)
+    return cases.case_of({"geometry": "random", "mesh_size": 0.1} | cell, material=materials)
 
 
 def cell_of(**keys) -> Cell:
@@ -78,7 +73,7 @@ def test_resolved_cases_are_cases():
         {"width": 60.0, "radii": RADII},
     ):
         case = case_of(mix=MIX, **keys)
-        assert parse(case.resolved(), Path()) == case
+        assert Case.parse(case.resolved()) == case
 
 
 FAULTS = {

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.base_case import AXIAL, TRANSVERSE, changed, fibre
+from support.cases import make_case
 
 from feti_homog.case.cases import parse
 
@@ -39,13 +40,9 @@ def test_moduli_in_unlike_units_are_remarked(matrix, young, is_alike):
 @pytest.mark.parametrize("name", ["E_transverse", "G_axial"])
 def test_moduli_of_one_phase_in_unlike_units_are_remarked(name):
     fibre = {"E_axial": 230e3, "E_transverse": 15e3, "nu_axial": 0.2, "nu_transverse": 0.3, "G_axial": 15e3}
-    asked = {
-        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.6},
-        "material": {"matrix": {"young": 3500.0, "poisson": 0.35}, "fibre": fibre | {name: 15.0}},
-        "analysis": {"type": "stiffness", "plane": "generalized"},
-    }
+    asked = make_case(matrix={"young": 3500.0, "poisson": 0.35}, fibre=fibre | {name: 15.0}, plane="generalized")
     line = f"[material.fibre] E_axial 230000, {name} 15: are both in one unit?"
-    assert [remark for remark in parse(asked, Path()).remarks() if "unit" in remark] == [line]
+    assert [remark for remark in asked.remarks() if "unit" in remark] == [line]
 
 
 @pytest.mark.parametrize(
@@ -61,13 +58,6 @@ def test_expansions_that_lack_their_power_of_ten_are_remarked(keys, named):
     moduli = {"young": 3.0, "poisson": 0.25}
     if "expansion_axial" in keys:
         moduli = {"E_axial": 9.0, "E_transverse": 3.0, "G_axial": 2.0, "nu_axial": 0.3, "nu_transverse": 0.3}
-    asked = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-        "material": {
-            "matrix": {"young": 3.0, "poisson": 0.25},
-            "fibre": keys if "stiffness" in keys else moduli | keys,
-        },
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    remarks = [line for line in parse(asked, Path()).remarks() if "expansion" in line]
+    asked = make_case(matrix={"young": 3.0, "poisson": 0.25}, fibre=keys if "stiffness" in keys else moduli | keys)
+    remarks = [line for line in asked.remarks() if "expansion" in line]
     assert remarks == [f"[material.fibre] {name}: is it in units of 1e-6?" for name in named]

@@ -1,11 +1,9 @@
 """Default sizes of elements at tips: as fine as the rest is accurate, and no finer than many tips allow."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support import cases
 
-from feti_homog.case import cases
 from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.fill.element_estimate import ElementEstimate, triangles_of_a_tip
 
@@ -15,14 +13,8 @@ RADIUS = np.sqrt(0.4 / np.pi)
 
 def case_of(kind="stiffness", values=None, arcs=({"fibre": "all", "angle": 120.0},), **cell):
     arcs = [{name: value for name, value in arc.items() if values is None or name != "angle"} for arc in arcs]
-    document = {
-        "cell": CELL | cell,
-        "material": {"matrix": {"young": 88.0, "poisson": 0.3}, "fibre": {"young": 200.0, "poisson": 0.2}},
-        "analysis": {"type": kind, "plane": "strain"},
-        "interface": {"debonded": arcs},
-    }
     given = {"angle": {"angle": {"values": values}}, "path": {"path": {"strain": [1.0, 0.0, 0.0]}}}
-    return cases.parse(document | given.get(kind, {}), Path())
+    return cases.case_of(CELL | cell, interface={"debonded": arcs}, **given.get(kind, {}))
 
 
 def size_of(case):

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX
+from support.cases import case_of
 from support.layered_meshes import layers
 from support.pixel_images import pixel_mesh
-from unit.mesh.test_touching import BRANCHES, TWO_FIBRES
+from unit.mesh.test_bodies import BRANCHES, TWO_FIBRES
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.analysis.description import describe
 from feti_homog.errors import CaseError
 
@@ -19,27 +19,21 @@ TOUCHES = "[interface] nodes that never part: at 1 two bodies meet more than onc
 MEET = "[interface] nodes that never part: at 1 three bodies meet"
 
 
-def case_of(folder: Path, image: np.ndarray, **interface: Any) -> Case:
+def of_image(folder: Path, image: np.ndarray, **interface: Any) -> Any:
     pixel_mesh(image).write(folder / "pixels.msh")
-    document = {
-        "cell": {"geometry": "mesh", "file": "pixels.msh"},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"pictures": False, "mesh_error": False},
-    }
-    return Case.parse(document | interface, folder)
+    return case_of({"geometry": "mesh", "file": "pixels.msh"}, folder, output={"mesh_error": False}, **interface)
 
 
 @pytest.mark.parametrize(("image", "remark"), [(BRANCHES, TOUCHES), (TWO_FIBRES, MEET)], ids=["touching", "triple"])
 def test_they_are_remarked_where_there_are_interfaces(tmp_path: Path, image: np.ndarray, remark: str) -> None:
-    bonded, debonding = case_of(tmp_path, image), case_of(tmp_path, image, interface={"normal_stiffness": 1.0})
+    bonded, debonding = of_image(tmp_path, image), of_image(tmp_path, image, interface={"normal_stiffness": 1.0})
     assert f"remark     {remark}" in describe(debonding, MPI.COMM_SELF).splitlines()
     assert "never part" not in describe(bonded, MPI.COMM_SELF)
     assert run(debonding, MPI.COMM_SELF).remarks == (remark,) and run(bonded, MPI.COMM_SELF).remarks == ()
 
 
 def test_they_are_printed_once(tmp_path: Path, capfd: Any) -> None:
-    case = case_of(tmp_path, BRANCHES, interface={"normal_stiffness": 1.0})
+    case = of_image(tmp_path, BRANCHES, interface={"normal_stiffness": 1.0})
     run(case, MPI.COMM_SELF, quiet=False)
     assert " ".join("".join(capfd.readouterr()).split()).count(TOUCHES) == 1
 
@@ -48,13 +42,8 @@ def test_they_are_printed_once(tmp_path: Path, capfd: Any) -> None:
 def test_a_bond_that_holds_the_cell_is_remarked(tmp_path: Path, phases: str, pinned: bool) -> None:
     """Layers one element thick have no other node."""
     layers(phases, 0).write(tmp_path / "layers.msh")
-    document = {
-        "cell": {"geometry": "mesh", "file": "layers.msh"},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "interface": {"normal_stiffness": 1.0},
-    }
-    described = describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
+    case = case_of({"geometry": "mesh", "file": "layers.msh"}, tmp_path, interface={"normal_stiffness": 1.0})
+    described = describe(case, MPI.COMM_SELF)
     assert ("never parts: it holds the cell" in described) == pinned
 
 
@@ -62,6 +51,6 @@ def test_an_arc_that_selects_no_other_node_is_faulty(tmp_path: Path) -> None:
     """The corner of the first fibre at which it touches the second."""
     arc = {"fibre": [1], "centre": 45.0, "angle": 20.0}
     with pytest.raises(CaseError, match="no node of fibre 1 is within the arc of 20"):
-        describe(case_of(tmp_path, TWO_FIBRES, interface={"debonded": [arc]}), MPI.COMM_SELF)
+        describe(of_image(tmp_path, TWO_FIBRES, interface={"debonded": [arc]}), MPI.COMM_SELF)
     other = arc | {"centre": 135.0}
-    assert describe(case_of(tmp_path, TWO_FIBRES, interface={"debonded": [other]}), MPI.COMM_SELF)
+    assert describe(of_image(tmp_path, TWO_FIBRES, interface={"debonded": [other]}), MPI.COMM_SELF)

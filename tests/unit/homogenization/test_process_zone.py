@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import support.cases
 from mpi4py import MPI
 from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import grid
@@ -36,14 +37,8 @@ def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=
     cell = {name: value for name, value in cell.items() if value is not None}
     bond = {"normal_stiffness": normal_stiffness, "tangential_stiffness": normal_stiffness / 4}
     own = {"criterion": criterion} | ({"toughness": 2.0} if criterion == "energy" else {})
-    document = {
-        "cell": cell if "file" in cell else CELL | cell,
-        "material": {"matrix": EPOXY, "fibre": GLASS},
-        "analysis": {"type": "path", "plane": plane},
-        "interface": bond | own,
-        "path": {"strain": [0.02, 0.0, 0.0]},
-    }
-    return cases.parse(document, Path(folder))
+    sections = {"material": {"matrix": EPOXY, "fibre": GLASS}, "interface": bond | own, "path": DOCUMENT["path"]}
+    return support.cases.case_of(cell if "file" in cell else CELL | cell, folder, plane, **sections)
 
 
 def warnings(case):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.cases import case_of
 from support.jobs import ROOT
 from unit.case.valid_cases import VALID_CASES
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
@@ -107,23 +108,20 @@ def test_springs_of_bonds_that_soften_the_cell_are_remarked(keys: Any, remarked:
     """At the limit that the remark names, bonds take less than 10 % of C11; at a fiftieth of it, more than half."""
     cell = {"geometry": "hexagonal", "fibre_fraction": 0.6, "fibre_radius": 0.008, "mesh_size": 0.1}
     materials = {"matrix": {"young": 3500.0, "poisson": 0.35}, "fibre": {"young": 72000.0, "poisson": 0.22}}
-    parts: dict[str, Any] = {"cell": cell, "material": materials}
 
     def with_springs(normal: float, tangential: float) -> list[str]:
         springs = {"normal_stiffness": normal, "tangential_stiffness": tangential}
         both = {name.replace("normal", "tangential"): value for name, value in (keys or {}).items()}
-        analysis = {"type": "path" if keys else "stiffness", "plane": "strain"}
         more = {"path": {"strain": [0.01, 0.0, 0.0]}} if keys else {}
         interface = springs | (keys or {}) | ({} if keys and "toughness" in keys else both)
-        case = Case.parse(parts | {"interface": interface, "analysis": analysis} | more)
+        case = case_of(cell, material=materials, interface=interface, **more)
         lines = describe(case, MPI.COMM_SELF).splitlines()
         return [line for line in lines if line.startswith("remark     [interface]") and "k r / E'" in line]
 
     def C11(stiffness: float | None) -> float:
         springs = {"normal_stiffness": stiffness, "tangential_stiffness": stiffness}
         more = {} if stiffness is None else {"interface": springs}
-        case = Case.parse(parts | {"analysis": {"type": "stiffness", "plane": "strain"}} | more)
-        stiffnesses = run(case, MPI.COMM_SELF).effective_stiffness
+        stiffnesses = run(case_of(cell, material=materials, **more), MPI.COMM_SELF).effective_stiffness
         assert stiffnesses is not None
         return float(stiffnesses[0, 0])
 
@@ -155,17 +153,11 @@ def test_springs_of_bonds_that_soften_the_cell_are_remarked(keys: Any, remarked:
 def test_bonding_that_a_mesh_does_not_have_is_remarked(curve, sections, expected, tmp_path):
     mesh = grid() if curve is None else grid().with_curve(RIGHT_SIDE, curve)
     mesh.write(tmp_path / "cell.msh")
-    phase = {"young": 1.0, "poisson": 0.3}
-    document = {
-        "cell": {"geometry": "mesh", "file": "cell.msh"},
-        "material": {"matrix": phase, "fibre": phase},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    lines = describe(Case.parse(document | sections, tmp_path), MPI.COMM_SELF).splitlines()
+    case = case_of({"geometry": "mesh", "file": "cell.msh"}, tmp_path, **sections)
+    lines = describe(case, MPI.COMM_SELF).splitlines()
     found = [line.removeprefix("remark     ") for line in lines if line.startswith("remark")]
     assert len(found) == len(expected) and all(map(str.startswith, found, expected)), found
-    result = run(Case.parse(document | sections, tmp_path), MPI.COMM_SELF)
-    assert list(result.remarks) == found
+    assert list(run(case, MPI.COMM_SELF).remarks) == found
 
 
 @pytest.mark.parametrize(
@@ -200,13 +192,8 @@ def test_only_moves_beyond_rounding_are_warnings(moved: float, warns: int, unit:
 def test_straight_edges_of_a_users_mesh_have_the_remark_of_generated_cells(name, more):
     """The lost area is the area of the outlines in the result minus the area of the meshed fibres."""
     phase = {"young": 3.0, "poisson": 0.3}
-    case = {
-        "cell": {"geometry": "mesh", "file": f"{name}.msh"} | more,
-        "material": dict.fromkeys(["matrix", "fibre"], phase),
-    }
-    case["material"] |= {"fibre:2": phase} if name == "two_fibres" else {}
-    case["analysis"] = {"type": "stiffness", "plane": "strain"}
-    result = run(Case.parse(case, ROOT / "meshes"))
+    materials = dict.fromkeys(["matrix", "fibre", *(["fibre:2"] if name == "two_fibres" else [])], phase)
+    result = run(case_of({"geometry": "mesh", "file": f"{name}.msh"} | more, ROOT / "meshes", material=materials))
     axes = [(f.radius, f.radius) if f.semi_axes is None else f.semi_axes for f in result.fibres]
     round_fraction = sum(np.pi * a * b for a, b in axes) / result.cell.area
     lost = 1.0 - result.cell.fibre_fraction / round_fraction
@@ -217,12 +204,10 @@ def test_straight_edges_of_a_users_mesh_have_the_remark_of_generated_cells(name,
 
 def test_a_matrix_within_a_fibre_is_remarked():
     """The fibre around the matrix has no radius."""
-    material = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
     for exchanged in (False, True):
         names = ("matrix", "fibre")[:: -1 if exchanged else 1]
         cell = {"geometry": "mesh", "file": "square.msh", "phases": dict(zip(("matrix", "fibre"), names, strict=True))}
-        document = {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
-        lines = describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF).splitlines()
+        lines = describe(case_of(cell, ROOT / "meshes"), MPI.COMM_SELF).splitlines()
         assert any("are its phase and another exchanged?" in line for line in lines) == exchanged
         assert any(re.match("fibres .*mean radius .*, fraction", line) for line in lines) != exchanged
 
@@ -230,9 +215,7 @@ def test_a_matrix_within_a_fibre_is_remarked():
 @pytest.mark.parametrize("boundary", ["displacement", "traction"])
 def test_sides_without_images_do_not_exchange_phases(boundary):
     cell = {"geometry": "mesh", "file": "square.msh", "boundary": boundary}
-    material = {phase: {"young": 3.0, "poisson": 0.3} for phase in ("matrix", "fibre")}
-    document = {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
-    assert "exchanged" not in describe(Case.parse(document, ROOT / "meshes"), MPI.COMM_SELF)
+    assert "exchanged" not in describe(case_of(cell, ROOT / "meshes"), MPI.COMM_SELF)
 
 
 def test_a_debonded_curve_between_phases_without_an_interface_is_remarked(tmp_path):
@@ -241,13 +224,13 @@ def test_a_debonded_curve_between_phases_without_an_interface_is_remarked(tmp_pa
         mesh = mesh.with_element(tag, 2, 3, mesh.elements[tag][3])
     replace(mesh, names=mesh.names | {3: "fibre:2"}).write(tmp_path / "cell.msh")
     phase, springs = {"young": 1.0, "poisson": 0.3}, {"normal_stiffness": 1e3, "tangential_stiffness": 1e3}
-    document = {
-        "cell": {"geometry": "mesh", "file": "cell.msh"},
-        "material": {"matrix": phase, "fibre": phase, "fibre:2": phase},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "interface": [springs | {"between": ["fibre", "fibre:2"]}],
-    }
+    materials = dict.fromkeys(["matrix", "fibre", "fibre:2"], phase)
+
+    def described(*pairs: list[str]) -> str:
+        interface = [springs | {"between": pair} for pair in pairs]
+        cell = {"geometry": "mesh", "file": "cell.msh"}
+        return describe(case_of(cell, tmp_path, material=materials, interface=interface), MPI.COMM_SELF)
+
     words = 'the curve "debonded" of the mesh is bonded between fibre and matrix: no [[interface]] joins them'
-    assert f"remark     {words}" in describe(Case.parse(document, tmp_path), MPI.COMM_SELF).splitlines()
-    document["interface"].append(springs | {"between": ["matrix", "fibre"]})
-    assert words not in describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
+    assert f"remark     {words}" in described(["fibre", "fibre:2"]).splitlines()
+    assert words not in described(["fibre", "fibre:2"], ["matrix", "fibre"])

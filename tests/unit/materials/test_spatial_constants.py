@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from reference.fibre_composites import compliance
+from support.effective_results import Sample, tensor_of_stiffness, turned_stiffness
 
 from feti_homog.materials.engineering_constants import (
     EngineeringConstants,
@@ -15,17 +16,8 @@ from feti_homog.materials.engineering_constants import (
     transversely_isotropic_stiffness,
 )
 
-PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 CONSTANTS = {"E1": 11.0, "E2": 14.0, "E3": 140.0, "nu12": 0.35, "nu13": 0.02, "nu23": 0.03, "G12": 4.0, "G13": 5.0}
 CONSTANTS["G23"] = 6.0
-
-
-def orthotropic(c):
-    """Stiffness from the compliance that the definitions of the constants give."""
-    S = np.diag([1 / c["E1"], 1 / c["E2"], 1 / c["E3"], 1 / c["G23"], 1 / c["G13"], 1 / c["G12"]])
-    for (i, j), nu, E in (((0, 1), "nu12", "E1"), ((0, 2), "nu13", "E1"), ((1, 2), "nu23", "E2")):
-        S[i, j] = S[j, i] = -c[nu] / c[E]
-    return np.linalg.inv(S)
 
 
 def random_stiffness(seed):
@@ -33,27 +25,16 @@ def random_stiffness(seed):
     return factor @ factor.T + 0.1 * np.eye(6)
 
 
-def tensor(stiffness):
-    """Fourth-order tensor of a (6, 6) stiffness."""
-    C = np.zeros((3, 3, 3, 3))
-    for row, (i, j) in enumerate(PAIRS):
-        for column, (k, m) in enumerate(PAIRS):
-            C[i, j, k, m] = C[j, i, k, m] = C[i, j, m, k] = C[j, i, m, k] = stiffness[row, column]
-    return C
-
-
 def turned(stiffness, degrees):
     """Return the same material turned about x3."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    Q = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    C = np.einsum("ai,bj,ck,dl,ijkl->abcd", Q, Q, Q, Q, tensor(stiffness))
-    return np.array([[C[a][b] for b in PAIRS] for a in PAIRS])
+    return turned_stiffness(stiffness, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
 
 
 def test_constants_of_an_orthotropic_stiffness_are_those_it_is_made_of():
-    found = dataclasses.asdict(engineering_constants(orthotropic(CONSTANTS)))
-    assert found == pytest.approx(CONSTANTS, rel=1e-12)
-    assert isinstance(engineering_constants(orthotropic(CONSTANTS)), EngineeringConstants)
+    found = engineering_constants(np.linalg.inv(Sample(tuple(CONSTANTS.values()), None).compliance))
+    assert dataclasses.asdict(found) == pytest.approx(CONSTANTS, rel=1e-12)
+    assert isinstance(found, EngineeringConstants)
 
 
 def test_contractions_are_those_of_a_state_of_uniaxial_stress():
@@ -92,8 +73,9 @@ def test_nearest_transversely_isotropic_stiffness_is_the_mean_over_all_turns(see
 def test_deviation_is_the_distance_of_the_tensors(seed):
     stiffness = random_stiffness(seed)
     found = transversely_isotropic_part(stiffness)
-    rest = tensor(stiffness) - tensor(transversely_isotropic_stiffness(found))
-    assert found.deviation == pytest.approx(np.linalg.norm(rest) / np.linalg.norm(tensor(stiffness)), rel=1e-12)
+    whole = tensor_of_stiffness(stiffness)
+    rest = whole - tensor_of_stiffness(transversely_isotropic_stiffness(found))
+    assert found.deviation == pytest.approx(np.linalg.norm(rest) / np.linalg.norm(whole), rel=1e-12)
     assert not is_transversely_isotropic(found)
 
 

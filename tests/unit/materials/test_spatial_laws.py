@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from support.effective_results import PAIRS, Sample, turned_stiffness
 
 from feti_homog.materials.laws import expansion, missing_constants, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.materials.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 
-AXES = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # of the order 11, 22, 33, 23, 13, 12
 ORTHOTROPIC = Orthotropic(
     E1=140.0, E2=10.0, E3=12.0, nu12=0.3, nu13=0.25, nu23=0.4, G12=5.0, G13=6.0, G23=3.0, expansion=(-0.5, 20.0, 30.0)
 )
@@ -23,27 +23,9 @@ def turn(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def tensor(stiffness: np.ndarray) -> np.ndarray:
-    """Return the (3, 3, 3, 3) tensor of a (6, 6) stiffness."""
-    found = np.zeros((3, 3, 3, 3))
-    for row, (i, j) in enumerate(AXES):
-        for column, (k, m) in enumerate(AXES):
-            found[i, j, k, m] = found[j, i, k, m] = found[i, j, m, k] = found[j, i, m, k] = stiffness[row, column]
-    return found
-
-
 def compliance(m: Orthotropic) -> np.ndarray:
-    """(6, 6) in the material axes, entry by entry from its definition."""
-    return np.array(
-        [
-            [1 / m.E1, -m.nu12 / m.E1, -m.nu13 / m.E1, 0, 0, 0],
-            [-m.nu12 / m.E1, 1 / m.E2, -m.nu23 / m.E2, 0, 0, 0],
-            [-m.nu13 / m.E1, -m.nu23 / m.E2, 1 / m.E3, 0, 0, 0],
-            [0, 0, 0, 1 / m.G23, 0, 0],
-            [0, 0, 0, 0, 1 / m.G13, 0],
-            [0, 0, 0, 0, 0, 1 / m.G12],
-        ]
-    )
+    """(6, 6) in the material axes."""
+    return Sample((m.E1, m.E2, m.E3, m.nu12, m.nu13, m.nu23, m.G12, m.G13, m.G23), None).compliance
 
 
 def rows(stiffness: np.ndarray) -> tuple[tuple[float, ...], ...]:
@@ -95,18 +77,16 @@ def test_a_transversely_isotropic_stiffness_is_that_of_hills_moduli():
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_rotation_is_that_of_the_fourth_order_tensor(angle):
-    own = tensor(np.linalg.inv(compliance(ORTHOTROPIC)))
-    R = turn(angle)
-    expected = np.einsum("ip,jq,kr,ls,pqrs->ijkl", R, R, R, R, own)
-    turned = dataclasses.replace(ORTHOTROPIC, angle=angle)
-    np.testing.assert_allclose(tensor(spatial_stiffness(turned)), expected, rtol=1e-12, atol=1e-10)
+    expected = turned_stiffness(np.linalg.inv(compliance(ORTHOTROPIC)), turn(angle))
+    turned = spatial_stiffness(dataclasses.replace(ORTHOTROPIC, angle=angle))
+    np.testing.assert_allclose(turned, expected, rtol=1e-12, atol=1e-10)
 
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_expansion_turns_as_a_tensor(angle):
     turned = expansion(dataclasses.replace(ORTHOTROPIC, angle=angle))
     expected = turn(angle) @ np.diag(ORTHOTROPIC.expansion) @ turn(angle).T
-    own = np.array([expected[i, j] * (1 if i == j else 2) for i, j in AXES])
+    own = np.array([expected[i, j] * (1 if i == j else 2) for i, j in PAIRS])
     np.testing.assert_allclose(turned, own, rtol=1e-13, atol=1e-13)
 
 

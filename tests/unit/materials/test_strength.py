@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from support.cases import MATRIX, case_of
 
-from feti_homog import Case
 from feti_homog.errors import CaseError
 from feti_homog.materials import voigt
 from feti_homog.materials.material_forms import PhaseStrength, utilisation
@@ -64,16 +64,9 @@ def test_hashin_at_a_combination_of_stresses():
 
 @pytest.mark.parametrize("keys", [{"tension": 80.0}, {"principal": 80.0, "von_mises": 90.0}, {"axial_tension": 1.0}])
 def test_the_keys_of_one_criterion_are_needed(keys):
-    document = {
-        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-        "material": {
-            "matrix": {"young": 3.0, "poisson": 0.3, "strength": keys},
-            "fibre": {"young": 70.0, "poisson": 0.2},
-        },
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
+    materials = {"matrix": MATRIX | {"strength": keys}, "fibre": MATRIX}
     fault = r"\[material.matrix\] strength: .*: expected the keys of one criterion"
     with pytest.raises(CaseError, match=fault) as caught:
-        Case.parse(document)
+        case_of({"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3}, material=materials)
     hint = f". With {next(iter(keys))} alone write principal, or add the other keys of its criterion"
     assert [fault.endswith(hint) for fault in caught.value.faults] == [len(keys) == 1]

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from support.generated_meshes import generate, mesh_of_discs
-from support.subdomains import cut
-from unit.mesh.test_table_ellipses import ROWS, cell_of, table
+from unit.mesh.test_table_ellipses import ROWS, body_areas, cell_of, table
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
@@ -12,7 +11,6 @@ from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.microstructure.arrangements import Arrangement
 
 CELLS = {
@@ -22,18 +20,6 @@ CELLS = {
     "thick": Cell(geometry="square", fibre_fraction=0.1, coating=1.0),
     "random": Cell(geometry="random", fibre_fraction=0.4, coating=0.02, fibres=5, seed=3, radius_spread=0.3),
 }
-
-
-def body_areas(mesh, refinements=4):
-    """(constituents,) areas within the refined polygons, none of whose elements may turn over."""
-    torus, lattice = Torus.of(mesh), ReferenceLattice.of(refinements, 1)
-    found = np.zeros(torus.constituent.max() + 1)
-    for submesh in cut(torus, torus.constituent):
-        fine = refine(submesh, lattice)
-        own = areas(fine.points, fine.triangles)
-        assert own.min() > 0
-        found[submesh.body] = own.sum()
-    return found
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -113,15 +99,6 @@ def test_centres_of_coatings_are_those_of_the_fibres():
     centres = fibre_circles(Torus.of(generate(cell)))[1:, :2]
     away = centres - arrange(cell).centres[[0, 1, 2, 3, 0, 1, 3]]
     assert np.abs(away - np.round(away)).max() < 1e-12
-
-
-def test_thin_coatings_of_thin_ellipses_have_good_elements():
-    rows = [{"x": 0.5, "y": 0.5, "a": 0.4, "b": 0.05, "angle": 20.0, "coating": 0.02}]
-    mesh = generate(cell_of(table(rows)))
-    sides = np.linalg.norm(mesh.points[mesh.triangles] - mesh.points[np.roll(mesh.triangles, 1, axis=1)], axis=2)
-    quality = 4 * np.sqrt(3) * areas(mesh.points, mesh.triangles) / (sides**2).sum(axis=1)
-    assert quality.min() > 0.1 and len(mesh.triangles) < 8000
-    body_areas(mesh)
 
 
 def test_coatings_that_overlap_are_reported():

@@ -6,12 +6,12 @@ import pytest
 import tomli_w
 from mpi4py import MPI
 from pattern_statistics import smallest_gap
+from support import cases
 from support.circular_cells import cell as circular
 from support.generated_meshes import generate
 from support.void_cells import write_voids
 
 from feti_homog import run
-from feti_homog.case import cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh import Torus
@@ -31,9 +31,7 @@ ROWS = [
 
 def case_of(tmp_path, cell, *phases):
     material = {"matrix": MATRIX} | {phase: {"young": 70.0, "poisson": 0.2} for phase in phases or ("fibre",)}
-    return cases.parse(
-        {"cell": cell, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}, tmp_path
-    )
+    return cases.case_of(cell, tmp_path, material=material)
 
 
 def table(rows, **keys):
@@ -92,10 +90,9 @@ def test_the_table_of_a_cell_with_voids_gives_it_again(tmp_path, cell):
     assert Torus.of(one).voids == Torus.of(other).voids > 0
     if cell["geometry"] == "random":
         assert np.abs(one.points - other.points).max() < 1e-12 and np.array_equal(one.triangles, other.triangles)
-    pattern = fibre_statistics.pattern(tmp_path / "case.toml", None) if cell["geometry"] == "random" else None
-    assert pattern is None or pattern.count == 12
-    window = fibre_statistics.pattern(tmp_path / "again.csv", None) if cell["geometry"] == "random" else None
-    assert window is None or (window.count, window.fibre_fraction) == (12, pytest.approx(0.4))
+        assert fibre_statistics.pattern(tmp_path / "case.toml", None).count == 12
+        window = fibre_statistics.pattern(tmp_path / "again.csv", None)
+        assert (window.count, window.fibre_fraction) == (12, pytest.approx(0.4))
 
 
 def _toml(case):
@@ -165,14 +162,9 @@ def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
 
 
 def test_a_void_is_no_fibre_that_can_debond(tmp_path):
-    document = {
-        "cell": table(ROWS),
-        "material": {"matrix": MATRIX, "fibre": {"young": 70.0, "poisson": 0.2}},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "interface": {"debonded": [{"fibre": 2, "angle": 60.0}]},
-    }
+    case = case_of(tmp_path, table(ROWS)).replace({"interface": {"debonded": [{"fibre": 2, "angle": 60.0}]}})
     with pytest.raises(CaseError, match=r"debonded\[0\].fibre = 2: expected at most 1; the cell has 1 fibres"):
-        run(cases.parse(document, tmp_path), MPI.COMM_SELF)
+        run(case, MPI.COMM_SELF)
 
 
 TUBE = {"x": 0.0, "y": 0.0, "radius": 0.2, "inner_radius": 0.12}

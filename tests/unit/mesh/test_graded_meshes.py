@@ -86,12 +86,6 @@ def test_a_fine_interface_takes_elements_beside_it_only(case=SQUARE):
     assert np.all((counts[1:] / counts[:-1] > 1.6) & (counts[1:] / counts[:-1] < 2.1))
 
 
-def test_cells_of_all_sizes_have_one_graded_mesh():
-    unit, small = (generate(cell("hexagonal", interface_size=0.01, **width)) for width in ({}, {"width": 2e-4}))
-    assert np.array_equal(small.triangles, unit.triangles)
-    assert small.points == pytest.approx(2e-4 * unit.points, rel=1e-14)
-
-
 def test_the_size_of_the_mesh_asks_for_no_grading():
     plain, same = (generate(cell("square", interface_size=size)) for size in (None, 0.05))
     assert np.array_equal(plain.points, same.points) and np.array_equal(plain.triangles, same.triangles)

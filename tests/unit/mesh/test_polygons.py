@@ -1,17 +1,17 @@
 """Rounded polygons of tables: their outlines, gaps and meshes, what is listed of them, faults."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import tomli_w
 from mpi4py import MPI
+from support import cases
 from support.generated_meshes import generate
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog import run
-from feti_homog.case import cases
+from feti_homog.case.cases import parse
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
@@ -37,9 +37,7 @@ def case_of(*rows, **cell):
     coated = any(row.get("coating") for row in rows)
     table = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": list(rows), "mesh_size": 0.06} | cell
     phases = ("matrix", "fibre", *(("coating",) if coated else ()))
-    material = {phase: {"young": 3.0, "poisson": 0.3} for phase in phases}
-    document = {"cell": table, "material": material, "analysis": {"type": "stiffness", "plane": "strain"}}
-    return cases.parse(document, Path())
+    return cases.case_of(table, material=dict.fromkeys(phases, cases.MATRIX))
 
 
 def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
@@ -147,7 +145,7 @@ def test_the_table_of_polygons_and_a_hollow_fibre_gives_the_cell_again(tmp_path)
     (tmp_path / "case.toml").write_text(tomli_w.dumps(document))
     (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
     document["cell"] = {"geometry": "table", "file": "again.csv", "mesh_size": 0.06}
-    mesh, again = generate(case.cell), generate(cases.parse(document, tmp_path).cell)
+    mesh, again = generate(case.cell), generate(parse(document, tmp_path).cell)
     sums = [[areas(m.points, m.triangles)[m.phase == phase].sum() for phase in range(3)] for m in (mesh, again)]
     assert sums[0] == pytest.approx(sums[1], rel=1e-3) and Torus.of(again).voids == 2
     run(case.replace({"cell.mesh_size": 0.2}), MPI.COMM_SELF, out=tmp_path / "run")

@@ -74,9 +74,11 @@ def test_a_void_at_a_side_is_one_at_the_opposite_side_too(mesh, tmp_path):
     )
 
 
-def test_no_void_lies_over_a_corner(tmp_path):
+def test_a_void_over_a_corner_leads_to_a_shift(tmp_path):
     write_voids(tmp_path / "cell.msh", [0], geometry="hexagonal")
-    assert faults_of(tmp_path / "cell.msh")[0].startswith("cell.msh: no node at the corner (0, 0)")
+    fault = faults_of(tmp_path / "cell.msh")[0]
+    assert fault.startswith("cell.msh: no node at the corner (0, 0)")
+    assert fault.endswith("if a hole is there, shift the fibres until the corners lie in material")
 
 
 ROOT = np.sqrt(3.0)
@@ -113,9 +115,3 @@ def test_another_cell_leads_to_the_recipe(tmp_path, name):
     mesh.write(tmp_path / "cell.msh")
     (fault,) = faults_of(tmp_path / "cell.msh")
     assert fault.startswith(f"cell.msh: the cell is a {kind}, expected a rectangle: see ")
-
-
-def test_a_hole_at_a_corner_leads_to_a_shift(tmp_path):
-    write_voids(tmp_path / "cell.msh", [0], geometry="hexagonal")
-    fault = faults_of(tmp_path / "cell.msh")[0]
-    assert fault.endswith("if a hole is there, shift the fibres until the corners lie in material")

@@ -14,7 +14,7 @@ import pytest
 from feti_homog.errors import CaseError
 from feti_homog.report import page
 from feti_homog.report.cards import export
-from feti_homog.report.text.summary import answers, checks
+from feti_homog.report.text.summary import answers
 from feti_homog.results import output_folder, result_json
 
 CELL = {
@@ -240,11 +240,6 @@ def test_bounds_stand_on_both_sides_of_what_was_computed() -> None:
     result["bounds"]["reuss"][0][0] = 9.5
     *_, table = answers(result, page.MOST_ROWS)
     assert table.cells[0] == ["C11 Reuss, Voigt", "9.5", "9", "10", "outside"] and len(table.cells[1]) == 4
-
-
-def test_checks_of_contact_have_a_limit_of_their_own() -> None:
-    result = document("load", checks={"hill": 2e-6, "kkt_tension": 2e-6})
-    assert checks(result).rows == [["hill", 2e-6, "pass"], ["kkt_tension", 2e-6, "FAIL"]]
 
 
 def no_folder(directory: Path) -> Path:

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from mpi4py import MPI
+from support.cases import case_of
 from support.other_formats import written
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog import Case, draw_state, run
+from feti_homog import draw_state, run
 from feti_homog.errors import FetiHomogError
 from feti_homog.results.viewed_states import read_state
 
@@ -19,14 +20,8 @@ TABLE = f"# width = 50, height = 40, left = 100, bottom = 200\nx,y,radius\n{ROWS
 
 
 def result_of(folder, **cell):
-    output = {"pictures": False, "fields": True}
-    document = {
-        "cell": cell,
-        "material": MATERIAL,
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": output,
-    }
-    return run(Case.parse(document), MPI.COMM_SELF, out=folder)
+    case = case_of(cell, material=MATERIAL, output={"pictures": False, "fields": True})
+    return run(case, MPI.COMM_SELF, out=folder)
 
 
 def test_fibres_of_a_cropped_table_have_the_centres_and_rows_of_the_table(tmp_path):

@@ -10,7 +10,7 @@ from support.base_case import changed
 
 from feti_homog import Case, read_state, run
 from feti_homog.errors import CaseError
-from feti_homog.results import field_guard, output_folder, result_json
+from feti_homog.results import field_guard, output_folder
 
 TEXT = h5py.string_dtype()
 TABLES = {
@@ -174,9 +174,6 @@ def test_all_rows_of_a_long_table_are_compared():
 
 
 def test_deeply_nested_documents_are_refused(tmp_path):
-    text = f'{{"checksum": "", "a": {"[" * 960}{"]" * 960}}}'
-    with pytest.raises(ValueError, match=r"nested too deeply|checksum is wrong"):
-        result_json.loads(text)
     (tmp_path / "result.json").write_text("[" * 1000 + "]" * 1000)
     with pytest.raises(CaseError, match=r"no run of this program wrote result\.json"):
         output_folder.refuse_files_of_others(tmp_path)

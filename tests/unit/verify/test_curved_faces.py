@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.cases import case_of
 from support.falsifications import SMALL, broken, shift
 from support.users_meshes import polar_cell
 from support.verified_results import FIBRE, MATRIX, SPRINGS, falsified
 
-from feti_homog import Case, run
+from feti_homog import run
 
 pytestmark = pytest.mark.slow
 
@@ -35,9 +36,9 @@ def test_lengths_and_normals_follow_from_the_mesh(shape, tmp_path):
     if "coating" in row:
         materials["coating"] = MATRIX
         bonds = [SPRINGS | {"between": pair} for pair in (["fibre", "coating"], ["coating", "matrix"])]
-    document = {"cell": cell | {"order": order}, "material": materials, "interface": bonds}
-    document |= {"analysis": {"type": "stiffness", "plane": "strain"}, "output": {"pictures": False, "fields": True}}
-    run(Case.parse(document), MPI.COMM_SELF, out=tmp_path / "out")
+    output = {"pictures": False, "fields": True}
+    case = case_of(cell | {"order": order}, material=materials, interface=bonds, output=output)
+    run(case, MPI.COMM_SELF, out=tmp_path / "out")
     assert not broken(tmp_path / "out")
 
     def longer(_, file):

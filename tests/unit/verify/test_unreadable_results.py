@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import pytest
 from support.verified_results import falsified, write
 
@@ -24,16 +25,12 @@ def cut(name, share):
 
 
 def foreign(folder):
-    import h5py
-
     with h5py.File(folder / "result.h5", "w") as file:
         file["something"] = [1, 2, 3]
 
 
 def without(*names):
     def damage(folder):
-        import h5py
-
         with h5py.File(folder / "result.h5", "r+") as file:
             for name in names:
                 del file[name]
@@ -43,8 +40,6 @@ def without(*names):
 
 def shorter(name):
     def damage(folder):
-        import h5py
-
         with h5py.File(folder / "result.h5", "r+") as file:
             values = file[name][()]
             del file[name]

@@ -17,9 +17,10 @@ from feti_homog.system.runtime import process
 PAGE, MEGABYTE = 4096, 2**20
 
 
-def laplacian(n=60):
-    line = diags([-1, 2.1, -1], [-1, 0, 1], (n, n))
-    return kronsum(line, line).tocsr()
+def grid(n=60):
+    """(n^2, n^2) a definite matrix."""
+    line = diags([-1.0, 2.1, -1.0], [-1, 0, 1], (n, n))
+    return csr_matrix(kronsum(line, line))
 
 
 def resident():
@@ -29,7 +30,7 @@ def resident():
 
 @pytest.mark.parametrize("columns", [(), (1,), (3,), (40,)])
 def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
-    A = laplacian(12)
+    A = grid(12)
     x = np.random.default_rng(0).standard_normal((A.shape[0], *columns))
     np.testing.assert_allclose(DirectSolver(A, "test_").solve(A @ x), x, atol=1e-10)
 
@@ -54,7 +55,7 @@ def solved_with_a_near_kernel(A, numbers):
 )
 def test_nothing_is_left_of_a_factor(make):
     """A path makes one at every event."""
-    A = laplacian()
+    A = grid()
     for _ in range(5):
         make(A)
     before = resident()
@@ -78,7 +79,7 @@ def test_a_factor_does_not_keep_its_matrix():
 def test_a_factor_can_be_freed_before_its_owner():
     before, kept = resident(), []
     for _ in range(60):
-        kept.append(DirectSolver(laplacian(), "test_"))
+        kept.append(DirectSolver(grid(), "test_"))
         kept[-1].destroy()
         kept[-1].destroy()
     assert resident() - before < 8 * MEGABYTE
@@ -100,12 +101,6 @@ SMALL, LARGE = 3, 40  # rows of grids of which CHOLMOD makes simplicial and supe
 LIBRARIES = ["cholmod", "mumps", "petsc"]
 # The first is a power of four, of which also the root has the same digits.
 SCALES = [2.0**-300, 2.0**-301, 2.0**301]
-
-
-def grid(n):
-    """(n^2, n^2) a definite matrix."""
-    line = diags([-1.0, 2.1, -1.0], [-1, 0, 1], (n, n))
-    return csr_matrix(kronsum(line, line))
 
 
 def spoilt(n, value):

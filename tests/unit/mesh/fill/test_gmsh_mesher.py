@@ -38,15 +38,18 @@ CELLS = {
 named = pytest.mark.parametrize("name", CELLS)
 
 
-@pytest.mark.parametrize("geometry", ["square", "hexagonal", "random"])
-def test_cells_of_all_sizes_have_one_mesh(geometry):
-    unit, small = (generate(cell(geometry, spread=0.3, **width)) for width in ({}, {"width": 2e-4}))
+@pytest.mark.parametrize(
+    ("geometry", "interface_size"), [("square", None), ("hexagonal", None), ("random", None), ("hexagonal", 0.01)]
+)
+def test_cells_of_all_sizes_have_one_mesh(geometry, interface_size):
+    keys = {"spread": 0.3, "interface_size": interface_size}
+    unit, small = (generate(cell(geometry, **keys, **width)) for width in ({}, {"width": 2e-4}))
     assert np.array_equal(small.triangles, unit.triangles) and np.array_equal(small.arc_edges, unit.arc_edges)
     for name in ("points", "ellipses.circles", "period"):
         one, other = map(attrgetter(name), (small, unit))
         assert one == pytest.approx(2e-4 * other, rel=1e-14)
     assert (small.width, small.height) == pytest.approx((2e-4, 2e-4 * unit.height))
-    of_radius = generate(cell(geometry, spread=0.3, fibre_radius=5e-6))
+    of_radius = generate(cell(geometry, **keys, fibre_radius=5e-6))
     radii = np.unique(of_radius.ellipses.circles[:, 2])
     assert radii.min() <= 5e-6 * (1 + 1e-12) and radii.max() >= 5e-6 * (1 - 1e-12)
     assert of_radius.ellipses.circles == pytest.approx(unit.ellipses.circles * of_radius.width, rel=1e-12)

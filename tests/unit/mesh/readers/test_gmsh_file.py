@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.users_meshes import polar_cell
+from support.users_meshes import converted, polar_cell
 from unit.mesh.binary_msh import write_binary
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 from unit.mesh.second_order import second_order
@@ -48,19 +48,6 @@ def by_gmsh(path: Path) -> RawMesh:
         tags, places, _ = mesh.getNodes()
         curves = {name: np.concatenate(ends) for name, ends in curves.items()}
         return assembled(tags.astype(np.int64), places.reshape(-1, 3), blocks, groups, curves)
-
-
-def written(source: Path, target: Path, version: float, binary: int, **options: float) -> Path:
-    """Return the file that gmsh makes of another in this version."""
-    with gmsh_session() as session:
-        session.open(str(source))
-        if "parts" in options:
-            session.option.setNumber("Mesh.PartitionCreatePhysicals", 0)
-            session.model.mesh.partition(int(options.pop("parts")))
-        for name, value in {"MshFileVersion": version, "Binary": binary, **options}.items():
-            session.option.setNumber(f"Mesh.{name}", value)
-        session.write(str(target))
-    return target
 
 
 def assert_same(result: RawMesh, expected: RawMesh, ordered: bool = True) -> None:
@@ -110,7 +97,7 @@ def test_cells_of_the_repository_are_those_of_gmsh_to_the_last_bit(name):
 @pytest.mark.parametrize(("version", "binary"), FORMATS)
 def test_files_of_every_kind_are_read_as_by_gmsh(version, binary, options, order, tmp_path):
     polar_cell((0.9, 0.1), 0.3, tmp_path / "cell.msh", order=order, size=0.25)
-    path = written(tmp_path / "cell.msh", tmp_path / "a.msh", version, binary, **options)
+    path = converted(tmp_path / "cell.msh", tmp_path / "a.msh", MshFileVersion=version, Binary=binary, **options)
     result = gmsh_file.load(path)
     assert len(result.triangles) > 30
     assert_same(result, by_gmsh(path), ordered="parts" not in options)
@@ -286,7 +273,7 @@ def test_an_entity_in_two_physical_groups_is_read_as_by_gmsh(last, tmp_path):
     grid().with_element(1, 2, 2, grid().elements[1][3]).write(tmp_path / "a.msh")
     text = (tmp_path / "a.msh").read_text().replace("1 2 2 2 2 ", "1 2 2 2 1 ")
     (tmp_path / "a.msh").write_text(text)
-    path = written(tmp_path / "a.msh", tmp_path / "b.msh", 4.1, 0) if last == 2 else tmp_path / "a.msh"
+    path = converted(tmp_path / "a.msh", tmp_path / "b.msh", MshFileVersion=4.1) if last == 2 else tmp_path / "a.msh"
     assert_same(gmsh_file.load(path), by_gmsh(path))
     with pytest.raises(MeshError, match="in 2 physical surfaces: "):
         read(path)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.cases import case_of
 from support.other_formats import written
 from support.pixel_images import quadrilaterals
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.mesh.readers.raw_mesh import in_triangles
 
 # Rows of 24 pixels from below, and C13, C23 of these squares: by another program with 8 x 8 squares a pixel, within
@@ -18,12 +19,9 @@ FORMATS = (".inp", ".vtu", ".msh", ".INP")
 
 
 def solved(image: np.ndarray, path):
-    document = {
-        "cell": {"geometry": "mesh", "file": str(written(quadrilaterals(image), path))},
-        "material": {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    return run(Case.parse(document), MPI.COMM_SELF)
+    materials = {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}}
+    cell = {"geometry": "mesh", "file": str(written(quadrilaterals(image), path))}
+    return run(case_of(cell, material=materials), MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.cases import FIBRE, MATRIX
+from support.cases import case_of
+from support.pixel_images import quadrilaterals
+from support.users_meshes import converted
 from support.vtk_files import vtk_grid
 from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, N, grid, node
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.msh_reader import read
@@ -30,18 +32,8 @@ def named() -> MshFile:
 
 def by_gmsh(path: Path, mesh: MshFile, **options: float) -> None:
     """Write by gmsh itself, in the format of the suffix."""
-    import gmsh
-
     mesh.write(path.with_name("source.msh"))
-    gmsh.initialize()
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(path.with_name("source.msh")))
-        for name, value in options.items():
-            gmsh.option.setNumber(name.replace("_", "."), value)
-        gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
+    converted(path.with_name("source.msh"), path, **options)
 
 
 def by_meshio(path: Path, data: str | None, kind: str | None = None, sets: bool = False) -> None:
@@ -108,9 +100,7 @@ def calculix(path: Path, kind: str = "CPE4") -> None:
 
 def quads() -> MshFile:
     """Return the grid of quadrilaterals."""
-    halves = grid().elements
-    corners = {tag: (*halves[tag][3], halves[tag + 1][3][2]) for tag in halves if tag % 2}
-    return replace(grid(), elements={tag: (3, *halves[tag][1:3], corners[tag]) for tag in corners})
+    return quadrilaterals(np.pad(np.ones((2, 2), int), 1))
 
 
 def in_few_letters(path: Path) -> None:
@@ -123,16 +113,8 @@ def in_few_letters(path: Path) -> None:
 
 def by_way_of_med(path: Path) -> None:
     """Convert by gmsh, which fills the names in MED files with blanks."""
-    import gmsh
-
     by_gmsh(path.with_name("b.med"), named())
-    gmsh.initialize()
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(path.with_name("b.med")))
-        gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
+    converted(path.with_name("b.med"), path)
     assert b'"E-Glass  ' in path.read_bytes()
 
 
@@ -148,10 +130,10 @@ def as_floats(path: Path) -> None:
 SETS = {"matrix": "Resin", "fibre": ["Glass"]}
 FILES = {
     "gmsh, names": ("a.msh", lambda path: by_gmsh(path, named()), WORDS),
-    "gmsh, numbers": ("a.msh", lambda path: by_gmsh(path, replace(grid(), names={}), Mesh_MshFileVersion=2.2), CODES),
-    "gmsh, numbers of names, binary": ("a.msh", lambda path: by_gmsh(path, named(), Mesh_Binary=1), CODES),
+    "gmsh, numbers": ("a.msh", lambda path: by_gmsh(path, replace(grid(), names={}), MshFileVersion=2.2), CODES),
+    "gmsh, numbers of names, binary": ("a.msh", lambda path: by_gmsh(path, named(), Binary=1), CODES),
     "gmsh's Abaqus": (
-        "a.inp", lambda path: by_gmsh(path, named(), Mesh_SaveGroupsOfElements=1),
+        "a.inp", lambda path: by_gmsh(path, named(), SaveGroupsOfElements=1),
         {"matrix": "EPOXY_resin", "fibre": "E-Glass"},
     ),
     "gmsh's Medit": ("a.mesh", lambda path: by_gmsh(path, named()), CODES),
@@ -174,12 +156,7 @@ FILES = {
 
 
 def stiffness(path: Path, **cell: Any) -> Any:
-    document = {
-        "cell": {"geometry": "mesh", "file": str(path)} | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": "stiffness", "plane": "strain"},
-    }
-    return run(Case.parse(document), MPI.COMM_SELF).effective_stiffness
+    return run(case_of({"geometry": "mesh", "file": str(path)} | cell), MPI.COMM_SELF).effective_stiffness
 
 
 def cut_by_turns() -> MshFile:
@@ -229,20 +206,6 @@ def test_the_matrix_proposed_is_the_largest_group(tmp_path, names):
     assert '"epoxy": 25 %' in faults[-1] and '"glass": 75 %' in faults[-1]
 
 
-@pytest.mark.parametrize(
-    ("names", "proposed"),
-    [
-        ({1: "fibre", 2: "resin"}, '{matrix = "resin"}'),
-        ({1: "Fibers", 2: "resin"}, '{matrix = "resin", fibre = "Fibers"}'),
-        ({1: "fibre:2", 2: "resin"}, '{matrix = "resin"}'),
-    ],
-)
-def test_groups_of_fibres_are_not_proposed_as_the_matrix(tmp_path, names, proposed):
-    """Even if they are the largest."""
-    faults = replace(grid(), names=names).faults(tmp_path)
-    assert f"add to [cell]: phases = {proposed}. Shares" in faults[-1]
-
-
 def test_sets_that_meshio_copies_from_gmsh_are_read(tmp_path):
     """They have numbers such as 12.0, and entities of gmsh, which may be negative."""
     by_meshio(tmp_path / "a.inp", None, "abaqus", sets=True)
@@ -272,12 +235,6 @@ def test_a_meshed_void_is_no_phase_to_be_named(tmp_path):
     faults = replace(grid(), names={1: "void", 2: "resin"}).faults(tmp_path)
     assert "expected no elements in a void" in faults[0]
     assert 'phases = {matrix = "resin"}' in faults[-1]
-
-
-def test_an_element_of_two_phases_is_refused(tmp_path):
-    calculix(tmp_path / "a.inp")
-    with pytest.raises(MeshError, match="is in 2 element sets: fibre, matrix"):
-        read(tmp_path / "a.inp", phases={"matrix": ("Ewhole",), "fibre": ("E_GLASS",)})
 
 
 def test_debonded_lines_have_any_name(tmp_path):

@@ -81,9 +81,19 @@ def test_a_translation_is_not_drawn(tmp_path: Path, spatial: bool) -> None:
         np.testing.assert_allclose(mean, 0.0, atol=1e-14)
 
 
-@pytest.mark.parametrize(("largest", "scale"), [(np.inf, 0.1), (0.1, 0.1), (0.099, 0.05), (0.0035, 0.002), (7.0, 0.1)])
-def test_the_scale_is_round_and_within_its_limit(largest: float, scale: float) -> None:
-    assert plot_helpers.magnification(1.0, 1.0, largest=largest) == pytest.approx(scale)
+@pytest.mark.parametrize(
+    ("displacement", "opening", "largest", "scale"),
+    [
+        *((1.0, 0.0, *pair) for pair in ((np.inf, 0.1), (0.1, 0.1), (0.099, 0.05), (0.0035, 0.002), (7.0, 0.1))),
+        *((u, 0.0, np.inf, scale) for u, scale in ((1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0), (2e-3, 50.0))),
+        *((2e-3, 1e-3, np.inf, 50.0), (2e-2, 2e-3, np.inf, 10.0), (0.5, 1e-3, np.inf, 0.5), (0.1, 0.1, np.inf, 1.0)),
+    ],
+)
+def test_the_scale_is_round_and_within_its_limit(
+    displacement: float, opening: float, largest: float, scale: float
+) -> None:
+    """A tenth of the cell is seen; openings of 0.2 % of it, too, if displacements stay below a quarter."""
+    assert plot_helpers.magnification(displacement, 1.0, opening, largest=largest) == pytest.approx(scale)
 
 
 def test_no_triangle_of_a_magnified_state_turns_over(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
-from support.sample_output import in_space, sample, write
+from support.sample_output import in_space, path_of, sample, write
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.report.plots import cell_picture, decimation, figures, plot_helpers
@@ -110,19 +110,12 @@ def test_all_pictures_are_made_and_texts_of_the_user_are_no_formulas(
     assert not [warning for warning in recwarn if "Glyph" in str(warning.message)]
 
 
-def listed(kind: str, **points: Any) -> dict[str, Any]:
-    """Return a document with a list of three points, as many as the sample has states."""
-    counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
-    section = {"strain": [0.0, 0.0, 1.0]} | ({"method": "events"} if kind == "path" else {"values": [0, 90, 180]})
-    case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "interface": {"contact": True}, kind: section}
-    rows = [counts | {key: values[k] for key, values in points.items()} for k in range(3)]
-    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, kind: rows}
-
-
+PATH, COUNTS = path_of([0.5, 0.2, 1.0]), {"bonded": 5, "open": 3, "closed": 2}
+ANGLES = [COUNTS | {"angle": angle, "stiffness": [[9, 2, 0], [2, 8, 0], [0, 0, 3]]} for angle in (0, 90, 180)]
+ANGLE_CASE = {"analysis": {"type": "angle", "plane": "strain"}, "angle": {"values": [0, 90, 180]}}
 LISTS = [
-    (listed("path", load_factor=[0.5, 0.2, 1], strain=[[0.5, 0, 0], [0.2, 0, 0], [1, 0, 0]], stress=[[3, 1, 0]] * 3),
-     ["path_states.png", "path.gif", "interface.png", "path.png"]),
-    (listed("angle", angle=[0, 90, 180], stiffness=[[[9, 2, 0], [2, 8, 0], [0, 0, 3]]] * 3),
+    (PATH, ["path_states.png", "path.gif", "interface.png", "path.png"]),
+    ({"schema": SCHEMA, "case": PATH["case"] | ANGLE_CASE, "angle": ANGLES},
      ["angle_states.png", "interface.png", "angle.png"]),
 ]  # fmt: skip
 
@@ -140,7 +133,7 @@ def test_pictures_of_paths_and_angles_are_made(tmp_path: Path, document: dict[st
 
 
 def test_without_fields_only_curves_are_drawn(tmp_path: Path) -> None:
-    document = LISTS[0][0] | {"case": LISTS[0][0]["case"] | {"output": {"fields": False}}}
+    document = PATH | {"case": PATH["case"] | {"output": {"fields": False}}}
     (tmp_path / "result.json").write_text(json.dumps(document))
     assert [path.name for path in figures.plot(tmp_path)] == ["path.png"]
 
@@ -248,11 +241,6 @@ def test_values_count_by_their_area() -> None:
     areas = np.append(np.ones(1001), np.full(1001, 1e-9))
     norm, _, extend = plot_helpers.colour_range(values, areas)
     assert (norm.vmin, norm.vmax) == pytest.approx((1, 2), abs=0.02) and extend == "both"
-
-
-@pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
-def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: float) -> None:
-    assert plot_helpers.magnification(largest, 1.0) == pytest.approx(scale)
 
 
 def test_a_missing_or_broken_result_is_reported(tmp_path: Path) -> None:

@@ -5,8 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.cases import case_of
 
-from feti_homog import Case, run
+from feti_homog import run
 from feti_homog.report.text.summary import summary
 
 NUMBER = re.compile(r"(?<![\w.+-])-?\d+\.?\d*(?:e[+-]?\d+)?(?![\w.])")
@@ -16,17 +17,12 @@ MATRIX, FIBRE = {"young": 3.0, "poisson": 0.35, "expansion": 6e-5}, {"young": 70
 @cache
 def result(plane, kind="stiffness"):
     """Return the raw numbers of a small cell, and its printed blocks."""
-    document = {
-        "cell": {"geometry": "random", "fibres": 2, "fibre_fraction": 0.3, "mesh_size": 0.3, "seed": 2},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
-        "analysis": {"type": kind, "plane": plane},
-    }
+    cell = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.3, "mesh_size": 0.3, "seed": 2}
+    sections = {"material": {"matrix": MATRIX, "fibre": FIBRE}, "output": {"sensitivities": True}}
     if kind == "path":
-        document["interface"] = {"normal_stiffness": 40.0, "tangential_stiffness": 20.0, "normal_strength": 0.05}
-        document["path"] = {"waypoints": [{"E11": 0.05}, {"E11": 0.0}]}
-    else:
-        document["output"] = {"sensitivities": True}
-    raw = run(Case.parse(document)).document
+        bonds = {"normal_stiffness": 40.0, "tangential_stiffness": 20.0, "normal_strength": 0.05}
+        sections |= {"interface": bonds, "path": {"waypoints": [{"E11": 0.05}, {"E11": 0.0}]}, "output": {}}
+    raw = run(case_of(cell, plane=plane, **sections)).document
     return raw, [block.splitlines() for block in summary(raw).split("\n\n")]
 
 

@@ -1,18 +1,23 @@
-"""Locks between processes, and files that are written whole or not at all."""
+"""Locks, files that are written whole or not at all, and cases that several groups of ranks share."""
 
 import csv
 import subprocess
 import sys
+import tomllib
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from mpi4py import MPI
+from support.base_case import MESH_CELL, changed
 from support.sweep_files import sweep_file
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
-from feti_homog.studies import case_folders, sweep_cases
-from feti_homog.system.runtime.file_locks import Lock, LockHeld
+from feti_homog.studies import case_folders, case_runs, sweep_cases
+from feti_homog.studies.case_runs import CaseRunner, Outcome
+from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S, Lock, LockHeld
 from feti_homog.system.runtime.file_locks import holder as holder_of
 
 HOLDER = """
@@ -132,3 +137,34 @@ def test_a_sweep_that_asks_for_more_is_another(tmp_path, asked):
     path.write_text(path.read_text().replace(old, f"{old.removeprefix('fields = false')}{asked}\n"))
     with pytest.raises(CaseError, match="its case-0001 differs from this file in keys that do not vary"):
         case_folders.prepare_folder(out, sweep_cases.load(path))
+
+
+def test_cases_of_others_are_passed_over_at_once_and_tried_again_at_last():
+    """The first case is computed elsewhere, somebody looks at the lock of the second."""
+    calls, done = [], set()
+
+    def run(entry, timeout, _):
+        calls.append((entry, timeout))
+        if entry == 1 or (entry == 2 and timeout == 0.0):
+            return Outcome.HELD_ELSEWHERE, "another"
+        if entry in done:
+            return Outcome.FINISHED_BEFORE, ""
+        done.add(entry)
+        return Outcome.COMPUTED, ""
+
+    runner = SimpleNamespace(run=run, comm=MPI.COMM_SELF, sweep=SimpleNamespace(entries=(1, 2, 3)))
+    runner.directory = Path("sweep")
+    assert CaseRunner.run_free(runner, shows=False) is None
+    assert done == {2, 3}
+    assert calls == [(entry, timeout) for timeout in (0.0, 0.0, LOCK_TIMEOUT_S, LOCK_TIMEOUT_S) for entry in (1, 2, 3)]
+
+
+def test_meshes_without_a_material_of_their_matrix_are_refused_before_any_case(tmp_path):
+    document = tomllib.loads(changed(MESH_CELL))
+    del document["material"]["matrix"]
+    files = [str(Path(__file__).parents[4] / "meshes" / f"{name}.msh") for name in ("square", "hexagonal")]
+    sweep = sweep_cases.expand(document | {"sweep": {"cell.file": files}}, tmp_path)
+    with pytest.raises(CaseError) as caught:
+        case_runs.run_all(sweep, tmp_path / "out", MPI.COMM_SELF, 1, retry=False, quiet=True)
+    assert caught.value.faults == ("[material.matrix]: missing section; the mesh has this phase",)
+    assert not (tmp_path / "out").exists()

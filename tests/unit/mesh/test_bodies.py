@@ -1,17 +1,24 @@
-"""Numbers, centres and corners of fibres, and the curves that a user's mesh has debonded."""
+"""Bodies of a cell: numbers, centres, corners of fibres, debonded curves, nesting, vertices at which bodies touch."""
 
+import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.generated_meshes import generate, mesh_of_discs
+from support.pixel_images import SYMMETRIES, pixel_mesh
+from support.void_cells import write_rings
+from unit.case.test_interface_pairs import Case, document
 from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, node
 
 from feti_homog.case.cell_section import Cell
+from feti_homog.homogenization import cell_remarks
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.mesh_fibres import fibre_circles, has_corners
+from feti_homog.mesh.mesh_fibres import fibre_circles, fibre_numbers, has_corners
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.submeshes import pinned_classes
 
 
 def circles_of(mesh):
@@ -144,3 +151,101 @@ def _layers():
 def test_lines_that_cannot_debond_are_refused(mesh, message, tmp_path):
     (fault,) = mesh.faults(tmp_path)
     assert fault.startswith("faulty.msh: ") and message in fault
+
+
+@pytest.fixture
+def coated(tmp_path):
+    write_rings(tmp_path / "coated.msh", "fibre", "fibre:2")
+    return read(tmp_path / "coated.msh")
+
+
+@pytest.mark.parametrize("order", [("matrix", "fibre", "coating"), ("matrix", "coating", "fibre")])
+def test_a_coating_is_around_its_fibre_whatever_the_order_of_phases(coated, order):
+    named = np.array([order.index(name) for name in ("matrix", "fibre", "coating")], np.int32)
+    mesh = replace(coated, phase=named[coated.phase], precedence=named[coated.phase], phases=order)
+    torus = Torus.of(mesh)
+    inwards = [order[torus.constituent_phase[body]] for body in np.argsort(torus.nesting)]
+    assert inwards == ["matrix", "coating", "fibre"]
+    number, is_fibre = fibre_numbers(torus)
+    assert number[torus.constituent_phase == 0] == 0 and (number[torus.constituent_phase > 0] == 1).all()
+    assert [order[phase] for phase in torus.constituent_phase[is_fibre]] == ["fibre"]
+
+
+def test_other_phases_have_numbers_of_their_own_and_nest_by_their_place(coated):
+    torus = Torus.of(coated)
+    assert fibre_numbers(torus)[0].tolist() == [0, 1, 2]
+    assert torus.nesting.tolist() == [0, 2, 1]
+
+
+def test_a_coating_without_a_fibre_is_a_fibre(tmp_path):
+    grid().write(tmp_path / "one.msh")
+    torus = Torus.of(replace(read(tmp_path / "one.msh"), phases=("matrix", "coating")))
+    number, is_fibre = fibre_numbers(torus)
+    assert number.tolist() == [0, 1] and is_fibre.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    "pair, words",
+    [
+        (["matrix", "glass"], 'the cell has no phase "glass"; it has matrix, fibre, fibre:2'),
+        (["matrix", "fibre"], "expected phases that touch"),
+    ],
+)
+def test_pairs_that_the_cell_does_not_have_are_reported(coated, pair, words):
+    case = Case.parse(document({"normal_strength": 1.0, "between": pair}))
+    (fault,) = cell_remarks.faults(case, coated.phases, *(coated.phase[each] for each in Torus.of(coated).sides[:2]))
+    assert fault.startswith("[interface] between = [") and words in fault
+
+
+# Rows from below: the fibre winds around the cell along the lowest, and its branches touch at (1, 2) / 4.
+BRANCHES = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [0, 1, 0, 0], [0, 1, 0, 0]])
+# A void at the corner (2, 2) / 5 of the fibre, which elsewhere is in the matrix; then along its side.
+VOID_AT_CORNER = np.array([[0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, -1, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]])
+VOID_AT_SIDE = np.array([[0, 0, 0, 0, 0], [0, 1, -1, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]])
+# Two fibres that touch, and so three bodies meet.
+TWO_FIBRES = np.array([[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 0]])
+
+
+def torus_of(folder: Path, image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SYMMETRIES[0]) -> Torus:
+    pixel_mesh(image, jitter, symmetry).write(folder / "pixels.msh")
+    return Torus.of(read(folder / "pixels.msh", has_voids=True))
+
+
+def places(torus: Torus, classes: np.ndarray, size: int) -> set[tuple[float, float]]:
+    """Return the plane nodes of some classes, in pixels."""
+    found = torus.mesh.points[classes[torus.node_class]] * size
+    return {tuple(place) for place in np.round(found, 1).tolist()}
+
+
+@pytest.mark.parametrize(
+    ("image", "touching", "triple"),
+    [
+        (BRANCHES, {(1, 2)}, set()),
+        (VOID_AT_CORNER, {(2, 2)}, set()),
+        (VOID_AT_SIDE, set(), set()),
+        (TWO_FIBRES, set(), {(2, 2)}),
+    ],
+    ids=["branches", "void at a corner", "void at a side", "two fibres"],
+)
+def test_bodies_that_do_not_meet_along_one_line_are_found_without_coordinates(
+    tmp_path: Path, image: np.ndarray, touching: set, triple: set
+) -> None:
+    for symmetry, jitter in zip(SYMMETRIES, itertools.cycle([0.0, 1e-9, 1e-2]), strict=False):
+        torus, size = torus_of(tmp_path, image, jitter, symmetry), len(image)
+        turned = [
+            {tuple(np.round((np.array(place) - size / 2) @ symmetry.T + size / 2, 1).tolist()) for place in some}
+            for some in (touching, triple)
+        ]
+        assert [places(torus, torus.touching, size), places(torus, torus.meeting > 2, size)] == turned
+        assert np.array_equal(torus.never_part, torus.touching | (torus.meeting > 2))
+
+
+def test_what_never_parts_is_pinned_rather_than_what_may(tmp_path: Path) -> None:
+    """Where no node is inside a body."""
+    torus = torus_of(tmp_path, np.kron(np.array([[1, 0], [0, 1]]), np.ones((1, 1), int)))
+    assert torus.never_part.all()
+    torus = torus_of(tmp_path, BRANCHES)
+    inside = torus.meeting == 1
+    assert inside[pinned_classes(torus)]
+    thin = torus_of(tmp_path, np.array([[1, 1, 1], [1, 0, 0], [0, 1, 0]]))
+    assert not (thin.meeting == 1).any() and thin.never_part[pinned_classes(thin)]

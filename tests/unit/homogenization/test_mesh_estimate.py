@@ -1,11 +1,13 @@
-"""Known tractions at vertices that pieces of a body share."""
+"""The mesh estimate: known tractions at shared vertices, and ratios of errors that all ranks use."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from feti_homog.homogenization import mesh_estimate
+from feti_homog.homogenization.mesh_estimate import SAMPLED, factors
 
 
 def group(points, sides, first):
@@ -34,3 +36,14 @@ def test_a_piece_that_meets_an_arc_in_a_vertex_has_its_traction(monkeypatch, uni
     for name in ("normal", "traction"):
         assert np.isfinite(getattr(known[0], name)).all()
         assert getattr(known[2], name) == pytest.approx(getattr(known[0], name))
+
+
+@pytest.mark.parametrize("own", [True, False])
+@pytest.mark.parametrize("other", [True, False])
+def test_ranks_use_one_ratio_where_bubbles_exist_on_some(own: bool, other: bool) -> None:
+    comm = SimpleNamespace(allreduce=lambda value, op: value or other)
+    cell: Any = SimpleNamespace(
+        lattice=SimpleNamespace(order=1), summary=SimpleNamespace(across=True), comm=comm,
+        subdomains=[SimpleNamespace(is_mixed=False), SimpleNamespace(is_mixed=own)],
+    )  # fmt: skip
+    assert factors(cell, 1) == SAMPLED[own or other]
