@@ -14,7 +14,7 @@ from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, labelled
 from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import provider, read_materials, unlike_units
-from feti_homog.case.relations import axes_lines, read_interfaces, relation_faults, stress_free
+from feti_homog.case.relations import axes_lines, read_interfaces, relation_faults, stress_free, unlike_strengths
 from feti_homog.case.rules import RULES, Rule
 from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.toml_files import is_key, leaves, read_document, short_digest, to_document, with_values
@@ -145,22 +145,10 @@ class Case:
         """List valid but probably unintended settings, one per line."""
         of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
         _, contrast = laws.contrast_lines(self.materials, self.analysis.plane)
-        stiffness = {name: float(laws.stiffness_of(m, self.analysis.plane).max()) for name, m in self.materials.items()}
-        bonds = sorted(self.interfaces, key=lambda bond: bond.normal_strength or float("inf"))[:1]  # others may hold
-        strengths = {name: material.strength for name, material in self.materials.items() if material.strength}
-        tables: list[tuple[str, Any, str, float]] = [
-            ("interface", b, "strength", min(stiffness.values())) for b in bonds
-        ]
-        tables += [(f"material.{name}.strength", s, "", stiffness[name]) for name, s in strengths.items()]
-        units = list[str]()
-        for section, table, end, least in tables:
-            given = {name: value or 0.0 for name, value in vars(table).items() if name.endswith(end)}
-            high = {name: value for name, value in given.items() if least < value < float("inf")}
-            question = f"above {least:g}, the stiffness of a phase: are both in one unit?"
-            units += [f"[{section}] {name} = {value:g}: {question}" for name, value in high.items()]
+        strengths = unlike_strengths(self.materials, self.interfaces, self.analysis.plane)
         idle = [label for label, each in labelled(self.interfaces) if each.friction_on_damage and each.friction == 0.0]
         frictionless = (f"[{label}] friction_on_damage = true: without effect, for friction = 0" for label in idle)
-        return (*of_elements, *contrast, *units, *frictionless)
+        return (*of_elements, *contrast, *strengths, *frictionless)
 
     def remarks(self) -> tuple[str, ...]:
         """List remarks on assumed and on doubtful settings, one per line."""

@@ -1,17 +1,17 @@
 """Read the [interface] sections, find contradictions between keys or sections, and write remarks on loads."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 from feti_homog.case import load_sections
-from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
+from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES, STRENGTHS
 from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_tables, labelled
 from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
-from feti_homog.materials import material_forms, voigt
+from feti_homog.materials import laws, material_forms, voigt
 from feti_homog.schema import TableReader, keys, types, wording
 
 # Relative tolerance between a softening branch and the keys that repeat its numbers.
@@ -184,6 +184,25 @@ def _faults_within(interface: InterfaceSection, table: Mapping[str, Any]) -> Ite
         yield f"{words} contact = false: faces that overlap do not press"
     if interface.growth == "released" and "growth" in law.keys:
         yield f'{words} growth = "released"; growth = "springs" goes with it'
+
+
+def unlike_strengths(
+    materials: Mapping[str, material_forms.Material], interfaces: Sequence[InterfaceSection], plane: str
+) -> list[str]:
+    """List strengths above the stiffness of their phase or, on interfaces, of the softest phase, one per line."""
+    stiffness = {name: float(laws.stiffness_of(material, plane).max()) for name, material in materials.items()}
+    bonds = sorted(interfaces, key=lambda bond: bond.normal_strength or math.inf)[:1]  # others may hold
+    tables = [
+        ("interface", {name: getattr(bond, name) for name in STRENGTHS}, min(stiffness.values())) for bond in bonds
+    ]
+    strengths = {name: vars(material.strength) for name, material in materials.items() if material.strength}
+    tables += [(f"material.{name}.strength", table, stiffness[name]) for name, table in strengths.items()]
+    return [
+        f"[{section}] {name} = {value:g}: above {least:g}, the stiffness of a phase: are both in one unit?"
+        for section, table, least in tables
+        for name, value in table.items()
+        if least < (value or 0.0) < math.inf
+    ]
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:

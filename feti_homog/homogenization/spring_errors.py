@@ -99,15 +99,21 @@ class SpringSides:
         node, ds, shape = self._nodes[side], self._ds[side], self._shape[:, side]
         k, moved = stiffness[node], self._in_space(jump)[node]
         traction = self._in_space(stiffness[:, :, None] * jump)[node]
-        blended = np.einsum("afq,fadi->fqdi", shape, moved)
+        blended, framed = (np.einsum("afq,fadi->fqdi", shape, values) for values in (moved, jump[node]))
         if moved.shape[2] == 2:
             blended = np.einsum("fqcd,fqdi->fqci", self._frame[side], blended)
         lumped = np.einsum("fa,fac,faci,facj->ij", self._weights[side], k, jump[node], jump[node], optimize=True)
         between = np.einsum("afq,fac->fqc", shape, k)
-        on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
+        # Slip that turns with the normal opens or closes stiff springs between nodes only if interpolated in space.
+        of_space, of_turns = (
+            np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, values, values, optimize=True)
+            for values in (blended, framed - blended)
+        )
         differences = (np.diff(values, n=self._order, axis=1)[:, 0] for values in (traction, moved))
         on_arcs = np.einsum("f,fdi,fdj->ij", self._share[side], *differences, optimize=True)
-        return np.asarray(beyond), distributed_arrays.allreduce_sum(self._comm, lumped - on_sides - on_arcs - on_arcs.T)
+        return np.asarray(beyond), distributed_arrays.allreduce_sum(
+            self._comm, lumped - of_space + of_turns - on_arcs - on_arcs.T
+        )
 
     def _in_space(self, components: Float) -> Float:
         """Rotate normal and tangential components to plane vectors (n, 2, k); keep axial components (n, 1, k)."""

@@ -84,12 +84,10 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     stress = stresses[:, component] + 0.0
     broke = np.array([point["broke"] for point in points])
     number, curve = np.arange(len(stress)), stress  # values of the leading stress, each with its point
-    by_events = document["case"]["path"]["method"] == "events"
     strains, names = voigt.voigt_names(len(points[0]["stress"]))
-    is_given = bool(path_curves.targets(document)[0].get(names[component]))
-    if (
-        by_events and not is_given and len(points) <= path_curves.first_leg(document)
-    ):  # two corners of each branch, one of the first
+    given, method = path_curves.targets(document)[0].get(names[component]), document["case"]["path"]["method"]
+    may_drop = method == "events" and not given
+    if may_drop and len(points) <= path_curves.first_leg(document):  # two corners of each branch, one of the first
         number = np.repeat(path_curves.rising_points(points), 2)[1:]
         curve = path_curves.load_controlled(points)[1:, component]
         curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)

@@ -63,6 +63,19 @@ def test_true_errors_are_near_their_estimates(comm, order, known, interface):
     assert found.mesh_error.energy > 0.5 * true[0, 0] / known.value[0]
 
 
+@pytest.mark.one_rank
+@pytest.mark.parametrize("order", [1, 2])
+def test_stiff_springs_beside_soft_ones_do_not_raise_the_estimate(comm, order):
+    """A slip that turns with the normal: between nodes, an interpolated jump opens stiff normal springs."""
+    fine, coarse = (
+        result(comm, cell={"order": order, "mesh_size": 0.1, "refine": refine}, interface=springs(1e6, 1.0))
+        for refine in (2, 0)
+    )
+    true = np.diag(np.abs(fine.effective_stiffness - coarse.effective_stiffness))[:2]
+    ratio = np.diag(coarse.mesh_error.effective_stiffness)[:2] / true
+    assert (ratio > 0.5).all() and (ratio < 5.0).all()
+
+
 def test_along_the_fibres_too(comm):
     modulus = AXIAL_SHEAR["hexagonal", 0.5].value[1]
     phases = ({"young": 2.5, "poisson": 0.25}, {"young": 25.0, "poisson": 0.25})
