@@ -38,7 +38,7 @@ def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
 PC_TYPES = "auto|none|lumped|dirichlet|influence"
 COLUMNS_HELP = "changed rows after which a new reference cell is factored; by default none below 2501 rows"
 OPTIONS = (
-    Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
+    Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the dual operator; only cg, fcg test jumps"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
     Option("feti_ksp_atol", "<real>", "0", "absolute tolerance of the dual residual"),
     Option("feti_ksp_max_it", "<integer>", "2000", "largest number of iterations per load case"),
