@@ -162,8 +162,9 @@ class Cell:
     match: Path | None = key(
         kinds.TABLE_FILE,
         "File, relative to the case file, with a table of the fibres in a micrograph: columns x, y, radius, and a "
-        'comment such as "# width = 120, height = 80". The cell gets the radii of the table and, as nearly as min_gap '
-        "allows, the distributions of distances to the two nearest neighbours. Ellipses count as equal-area discs.",
+        'comment such as "# width = 120, height = 80". The cell gets the ratios of the radii, which fibre_radius '
+        "scales, and, as nearly as min_gap allows, the distributions of distances to the two nearest neighbours. "
+        "Ellipses count as equal-area discs.",
         absent="none",
         only=RANDOM,
     )

@@ -147,6 +147,9 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
         remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"
         if abs(cell.fibre_fraction / fraction - 1.0) > SAME_RATIO:
             lines += [f"{remark}; distances between neighbours are the same in diameters"]
+    if cell.matched is not None and case.interfaces and cell.width is None and cell.fibre_radius is None:
+        radius = f"fibre_radius = {cell.matched.radii.mean():.4g}"
+        lines += [f"[cell] width: missing, and therefore 1; {radius} would give the lengths of the table"]
     return tuple(lines)
 
 

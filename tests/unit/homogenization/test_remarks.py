@@ -32,6 +32,20 @@ def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
 
 
+@pytest.mark.parametrize(
+    ("sizes", "is_remarked"), [({}, True), ({"fibre_radius": 3.0}, False), ({"width": 90.0}, False)]
+)
+def test_lengths_of_a_matched_cell_are_those_of_its_width(sizes, is_remarked):
+    """The fibres of the table have a mean radius of 3.5."""
+    content = tomllib.loads((ROOT / "drivers/matched.toml").read_text(encoding="utf-8"))
+    del content["sweep"]
+    content["cell"] |= sizes
+    content["interface"] = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "debonded": []}
+    case = Case.parse(content, ROOT / "drivers")
+    line = f"[cell] width: missing, and therefore 1; fibre_radius = {case.cell.matched.radii.mean():.4g} would give"
+    assert any(remark.startswith(line) for remark in case_remarks(case)) == is_remarked
+
+
 @pytest.mark.parametrize(("boundary", "bound"), [("displacement", "an upper"), ("traction", "a lower")])
 def test_conditions_on_sides_bound_the_result(boundary, bound):
     """Given displacements leave less freedom than periodic ones, tractions more."""
