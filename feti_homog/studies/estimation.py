@@ -100,8 +100,11 @@ class ParameterEstimates:
 
     @property
     def chance(self) -> float | None:
-        """The probability of such or larger residuals if the model is correct; None without degrees of freedom."""
-        freedom = len(self.residuals) - self.rank
+        """The probability of such or larger residuals if the model is correct; None without degrees of freedom.
+
+        An unknown at a bound takes no degree of freedom from the residuals.
+        """
+        freedom = len(self.residuals) - max(self.rank - np.count_nonzero(self.at_bound), 0)
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
     @property
@@ -142,6 +145,47 @@ def estimate(
     x, derivatives = minimum.x * size, minimum.jac * std[:, None] / size
     estimates = summarize(x, minimum.fun * std + y, measured, derivatives, bounds)
     return replace(estimates, evaluations=minimum.nfev, converged=bool(minimum.success))
+
+
+def with_ranges(
+    estimates: ParameterEstimates, residuals: Model, measured: tuple[Float, Float], bounds: tuple[Float, Float]
+) -> ParameterEstimates:
+    """Replace derivatives that mispredict the range of an unknown by secants of this range; see `estimate`.
+
+    In the range, between bounds, r^T r is at most its minimum plus the square of the quantile of CONFIDENCE, while the
+    other unknowns stay; the longer side counts.  Where values jump, derivatives know nothing about the range.
+    `residuals` is inf without values.
+    """
+    x, quantile, J = estimates.x, float(norm.ppf((1 + CONFIDENCE) / 2)), estimates.jacobian.copy()
+    tiny = float(np.finfo(float).tiny)
+    limit = estimates.residuals @ estimates.residuals + quantile**2
+
+    def moved(k: int, step: float) -> Float:
+        return residuals(np.where(np.arange(len(x)) == k, x + step, x))
+
+    def is_within(k: int, step: float) -> bool:
+        r = moved(k, step)
+        return bool(r @ r <= limit)
+
+    for k, size in enumerate(_sizes(x)):
+        slope, ends, widths = max(float(np.linalg.norm(J[:, k])), tiny), list[Float](), list[float]()
+        for side, most in ((-1, x[k] - bounds[0][k]), (1, bounds[1][k] - x[k])):
+            inside, outside = 0.0, min(quantile / slope / np.sqrt(2.0), most)
+            while is_within(k, side * outside) and inside < most:
+                inside, outside = outside, min(2.0 * outside, most)
+            while inside < outside / 2 and outside > STEP * size:
+                middle = (inside + outside) / 2
+                inside, outside = (middle, outside) if is_within(k, side * middle) else (inside, middle)
+            end = moved(k, side * outside)
+            ends.append(end if np.isfinite(end).all() else moved(k, side * inside))
+            widths += [(inside + outside) / 2] if inside < outside else []
+        if not widths:  # the range has no end
+            J[:, k] = 0.0
+        elif not 0.8 < max(widths) * slope / quantile < 1.25:  # more than the steps in search of the ends
+            secant = ends[1] - ends[0]
+            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * quantile / max(widths)
+    ranged = summarize(x, estimates.computed, measured, J * measured[1][:, None], bounds)
+    return replace(ranged, evaluations=estimates.evaluations, converged=estimates.converged)
 
 
 def descend(squares: Callable[[Float], float], start: Float, bounds: tuple[Float, Float]) -> None:

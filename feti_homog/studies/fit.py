@@ -180,11 +180,20 @@ class Evaluations:
         rows = [(unknown.start, unknown.lower, unknown.upper) for unknown in self.fit.unknowns.values()]
         start, low, high = np.array(rows).T
 
-        def squares(x: Float | Point) -> float:
+        def residuals(x: Float | Point) -> Float:
             if _rounded(x) not in self.computed:
                 with suppress(CaseError, ConvergenceError):
                     self.values(np.array(x))
-            return float(np.square((self.computed.get(_rounded(x), np.inf) - y) / std).sum())
+            return np.asarray((self.computed.get(_rounded(x), np.inf) - y) / std)
+
+        def squares(x: Float | Point) -> float:
+            return float(np.square(residuals(x)).sum())
+
+        def finished(estimates: estimation.ParameterEstimates) -> estimation.ParameterEstimates:
+            if estimates.misfits or all(datum.strain is None for datum in self.fit.data):
+                return estimates
+            ranged = estimation.with_ranges(estimates, residuals, (y, std), (low, high))
+            return replace(ranged, evaluations=len(self.answers))
 
         def search(x: Float) -> estimation.ParameterEstimates:
             estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
@@ -195,7 +204,7 @@ class Evaluations:
         with suppress(CaseError):
             estimates = search(start)
         if estimates is not None and (estimates.chance is None or estimates.chance > 1.0 - estimation.CONFIDENCE):
-            return estimates
+            return finished(estimates)
         if not self.evaluator.quiet:
             standard_streams.say("remark: a poor fit, or none, from this start; the next is the best further point:")
         box = [Axis(path, ends=(a, b), log=a > 0.0) for path, a, b in zip(self.fit.paths, low, high, strict=True)]
@@ -206,7 +215,7 @@ class Evaluations:
         if estimates.misfits:
             estimation.descend(squares, start, (low, high))
             estimates = search(np.array(min(self.computed, key=squares)))
-        return estimates
+        return finished(estimates)
 
     def values(self, x: Float) -> Float:
         """Return data (m,) computed at x (n,), once for each x.  Raises CaseError and ConvergenceError.  On rank 0."""

@@ -139,7 +139,7 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
         reasons = (ways.get(name.partition("_")[0], "") for name in missing)
         lines = (f"[measured] {name}: this result has no such value" for name in missing)
         raise CaseError(*(f"{line}{reason}" for line, reason in zip(lines, reasons, strict=True)))
-    return np.array([values[d.name] if d.strain is None else _on_curve(document, d)[0] for d in data])
+    return np.array([values[d.name] if d.strain is None else _on_curve(document, d) for d in data])
 
 
 def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], name: str) -> Float | None:
@@ -170,24 +170,21 @@ def exact_derivatives(document: path_curves.Document, data: Sequence[Datum], nam
     is_toughness = key == TOUGHNESS and key in law.keys and not law.softens
     if not is_toughness and strengths != [key]:
         return None
-    # Stress S, strain E, strength R: S(E; s R) = s S(E / s; R), unless a value depends on the final load.
+    # Stress S, strain E, strength R: S(E; s R) = s S(E / s; R), unless a value depends on the final load.  Between the
+    # jumps of a curve, this derivative is zero and tells nothing.
     relative = (0.5 if is_toughness else 1.0) / float(tables[0][key])
     numbers, derivatives = _values(document), list[float]()
     for datum in data:
-        if datum.strain is not None:
-            value, slope = _on_curve(document, datum)
-            derivatives.append((value - abs(datum.strain) * slope) * relative)
-            continue
         mark, _, component = datum.name.partition("_")
         is_peak = mark == "peak" and numbers[datum.name] != numbers[f"end_{component}"]
-        if not (mark in ("onset", "envelope") or is_peak):
+        if datum.strain is not None or not (mark in ("onset", "envelope") or is_peak):
             return None
         derivatives.append(numbers[datum.name] * relative)
     return np.array(derivatives)
 
 
-def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, float]:
-    """Interpolate a path's stress S at the strain E of a datum; return S and the slope dS/dE.
+def _on_curve(document: path_curves.Document, datum: Datum) -> float:
+    """Interpolate a path's stress at the strain of a datum.
 
     Raises CaseError if another strain component rises along the path, the path ends below E, or the signs differ.
     """
@@ -203,7 +200,4 @@ def _on_curve(document: path_curves.Document, datum: Datum) -> tuple[float, floa
         raise CaseError(f"{place}: expected the sign of the strain of the path, which ends at {end:g}")
     if at > strain[-1] * (1 + path_curves.SAME_LOAD):
         raise CaseError(f"{place}: beyond the end of the path at {strain[-1]:g}")
-    k = int(np.clip(np.searchsorted(strain, at), 1, len(strain) - 1))
-    length = strain[k] - strain[k - 1]
-    slope = float((stress[k] - stress[k - 1]) / length) if length > 0 else 0.0
-    return float(stress[k - 1] + slope * (at - strain[k - 1])), slope
+    return float(np.interp(at, strain, stress))

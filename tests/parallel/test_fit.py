@@ -155,8 +155,8 @@ FIBRE_THAT_DEBONDS = {
 
 
 @pytest.mark.one_rank
-def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, shared_path):
-    """Derivatives by the scaling law are those of a central difference; the fit returns the toughness."""
+def test_toughness_is_fitted_to_onsets_without_differences_and_to_curves_within_their_jumps(comm, shared_path):
+    """The derivative of an onset by the scaling law is a central difference; between jumps, a curve has none."""
     document = copy.deepcopy(FIBRE_THAT_DEBONDS)
     document["unknown"] = {"interface.toughness": {"start": 3.0, "lower": 0.5, "upper": 10.0}}
     rows = "".join(f"{strain}, 1.0\n" for strain in STRAINS)
@@ -168,14 +168,24 @@ def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, share
     asked = on_root(comm, fit_file.parse, document, Path())
     below, found, above = (run(asked.at([G]).cases[0], comm).document for G in (1.9999, 2.0, 2.0001))
     difference = (predicted(above, asked.data) - predicted(below, asked.data)) / 2e-4
-    assert exact_derivatives(found, asked.data, "interface.toughness") == pytest.approx(difference, rel=1e-4, abs=1e-4)
+    exact = exact_derivatives(found, asked.data[:1], "interface.toughness")
+    assert exact == pytest.approx(difference[:1], rel=1e-4, abs=1e-4) and np.abs(difference[1:]).max() < 1e-6
+    assert exact_derivatives(found, asked.data, "interface.toughness") is None
     onset, *stresses = predicted(found, asked.data)
     document["measured"]["onset_S11"]["value"] = onset
     rows = "".join(f"{strain}, {stress!r}\n" for strain, stress in zip(STRAINS, map(float, stresses), strict=True))
     on_root(comm, (shared_path / "curve.csv").write_text, f"E11, S11\n{rows}")
-    fitted = run_fit(document, shared_path / "out", comm)
+    curve = document["measured"].pop("curve")
+    fitted = run_fit(document, shared_path / "onset", comm)
     assert fitted["unknowns"]["interface.toughness"]["estimate"] == pytest.approx(2.0, rel=1e-6)
-    assert fitted["status"] == "done" and not [*(shared_path / "out").glob("differences-*")]
+    assert fitted["status"] == "done" and not [*(shared_path / "onset").glob("differences-*")]
+    document["measured"] = {"curve": curve}
+    fitted = run_fit(document, shared_path / "out", comm)
+    low, high = fitted["unknowns"]["interface.toughness"]["interval"]
+    assert fitted["status"] == "done" and fitted["sum_of_squares"] < 1e-6 and low < 2.0 < high
+    for end, is_met in ((1.5 * low - 0.5 * high, False), (2.0, True), (1.5 * high - 0.5 * low, False)):
+        values = predicted(run(asked.at([end]).cases[0], comm).document, asked.data)[1:]
+        assert (np.square((values - stresses) / curve["std"]).sum() < 1.96**2) == is_met
 
 
 def bad_start(comm, path, document, truth, starts):

@@ -170,6 +170,35 @@ def test_the_result_is_the_best_point_of_all_that_were_computed():
     assert 59.0 < found.x[0] < 61.0 and found.computed == pytest.approx([1.0, 2.0])
 
 
+@pytest.mark.parametrize("x", [21.0, 22.0, 23.9])
+def test_the_interval_of_data_that_jump_is_the_range_in_which_they_stay(x):
+    """Steps of 4 from 20 to 24, of straight lines between bounds, and of constants."""
+    y, std, low, high = np.array([1.0, 2.0]), np.array([0.01, 0.02]), np.zeros(1), np.full(1, 100.0)
+    models = {
+        "steps": lambda a: np.floor(a[0] / 4.0) / 5.0 * y,
+        "line": lambda a: y * (1.0 + (a[0] - x) / 100.0),
+        "constant": lambda a: y,
+    }
+    for kind, slope in (("steps", 0.0), ("steps", 7.0), ("line", 0.01), ("constant", 0.0)):
+        found = estimation.summarize(np.array([x]), y, (y, std), slope * y[:, None], (low, high))
+        ranged = estimation.with_ranges(found, lambda a, f=models[kind]: (f(a) - y) / std, (y, std), (low, high))
+        (width,) = ranged.half_width
+        if kind == "steps":
+            longer = max(x - 20.0, 24.0 - x)
+            assert 0.75 * longer < width < 1.5 * longer
+        else:
+            assert width == (pytest.approx(1.959964 / 2**0.5) if kind == "line" else np.inf)
+
+
+def test_a_value_far_from_the_model_at_a_bound_is_a_misfit():
+    """One value leaves no freedom beside one unknown, but an unknown at its bound takes none."""
+    edges = np.array([0.5]), np.array([1.5])
+    found = fitted(np.array([9.0]), model=lambda a: a, jacobian=np.atleast_2d, start=(1.0,), bounds=edges)
+    assert found.at_bound.tolist() == [1] and found.misfits
+    found = fitted(np.array([1.2]), model=lambda a: a, jacobian=np.atleast_2d, start=(1.0,), bounds=edges)
+    assert found.chance is None and not found.misfits
+
+
 def test_an_unknown_that_no_step_moves_has_neither_interval_nor_noise():
     """Rounding errors of the values are no derivatives."""
     cases = closed(lambda a: np.array([1.0, 2.0]) * (1.0 + 1e-13 * np.sin(1e6 * a)), a=(30.0, 10.0, 70.0))
