@@ -135,18 +135,16 @@ def about_fibres(C: Array) -> dict[str, Any]:
     """
     k, m = isotropic_part(C[IN_PLANE_BLOCK])
     across = (C[0, 2] + C[1, 2] + C[2, 0] + C[2, 1]) / 4
-    E, nu = C[2, 2] - across**2 / k, across / (2 * k)
-    E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
+    return elastic_constants(C[2, 2] - across**2 / k, across / (2 * k), (C[3, 3] + C[4, 4]) / 2, m, k)
+
+
+def elastic_constants(E_axial: Any, nu_axial: Any, G_axial: Any, G: Any, K: Any) -> dict[str, Any]:
+    """Tabulate all constants from G and K across the fibres: 4/E_T = 1/K + 1/G + 4 nu_A^2/E_A, nu_T = E_T/(2 G) - 1."""
+    E = 4 / (1 / K + 1 / G + 4 * nu_axial**2 / E_axial)
     return {
-        "E_axial": E, "E_transverse": E_transverse, "nu_axial": nu, "nu_transverse": nu_transverse,
-        "G_axial": (C[3, 3] + C[4, 4]) / 2, "G_transverse": m, "K_transverse": k,
+        "E_axial": E_axial, "E_transverse": E, "nu_axial": nu_axial, "nu_transverse": E / (2 * G) - 1,
+        "G_axial": G_axial, "G_transverse": G, "K_transverse": K,
     }  # fmt: skip
-
-
-def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: float) -> tuple[float, float]:
-    """Return E_T and nu_T: 4/E_T = 1/bulk + 1/shear + 4 nu_A^2/E_A and nu_T = E_T/(2 shear) - 1 (Hill 1964)."""
-    E_transverse = 4 / (1 / bulk + 1 / shear + 4 * nu_axial**2 / E_axial)
-    return E_transverse, E_transverse / (2 * shear) - 1
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:

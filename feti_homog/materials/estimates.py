@@ -153,10 +153,9 @@ def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Est
     k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`; E_T and nu_T
     follow.  Christensen and Lo 1979; springs on fibres of equal radius: Hashin 1990.
     """
-    x = cylinders_in_matrix(matrix, fibres)
-    G = transverse_shear(matrix, fibres[0])
-    E_transverse, nu_transverse = engineering_constants.transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)
-    return dataclasses.replace(Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G)
+    x, G = cylinders_in_matrix(matrix, fibres), transverse_shear(matrix, fibres[0])
+    table = engineering_constants.elastic_constants(x.E_axial, x.nu_axial, x.G_axial, G, x.K_transverse)
+    return dataclasses.replace(Estimate.of(x), **table)
 
 
 def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -200,7 +201,7 @@ def aligned_cylinders(
     coupling = stiff * mean
     poisson = coupling / (2 * bulk)
     young = np.sum(c * (along - across**2 / x)) + coupling * mean - coupling**2 / bulk
-    E_transverse, nu_transverse = engineering_constants.transverse_constants(young, poisson, bulk, shear)
+    table = engineering_constants.elastic_constants(young, poisson, dispersed(c, p, p0), shear, bulk)
     strains: tuple[float | None, float | None] = (None, None)
     if None not in (free := [expansions(phase) for phase in phases]):
         axial, transverse = np.array(free, dtype=float).T
@@ -210,13 +211,7 @@ def aligned_cylinders(
         area, length = np.linalg.solve([[bulk, coupling], [coupling, young + coupling**2 / bulk]], stresses)
         strains = float(length), float(area / 2)
     return TransverseIsotropy(
-        E_axial=float(young),
-        E_transverse=float(E_transverse),
-        nu_axial=float(poisson),
-        nu_transverse=float(nu_transverse),
-        G_axial=dispersed(c, p, p0),
-        G_transverse=shear,
-        K_transverse=float(bulk),
+        **{name: float(value) for name, value in table.items()},
         expansion_axial=strains[0],
         expansion_transverse=strains[1],
         deviation=0.0,
@@ -249,15 +244,9 @@ def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIs
     x = 1 / m + 2 / k + 1 / matrix.G_transverse
     bulk = 1 / (1 / k + 2 * normal)
     shear = 1 / (1 / m + (x * total + 12 * normal * tangential) / (x + 3 * total))
-    E_transverse, nu_transverse = engineering_constants.transverse_constants(fibre.E_axial, fibre.nu_axial, bulk, shear)
-    return replace(
-        fibre,
-        E_transverse=E_transverse,
-        nu_transverse=nu_transverse,
-        G_axial=1 / (1 / fibre.G_axial + axial),
-        G_transverse=shear,
-        K_transverse=bulk,
-    )
+    G_axial = 1 / (1 / fibre.G_axial + axial)
+    table = engineering_constants.elastic_constants(fibre.E_axial, fibre.nu_axial, G_axial, shear, bulk)
+    return replace(fibre, **table)
 
 
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
@@ -273,11 +262,7 @@ def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy
         return k, m, pick(phase.G_axial for phase in phases)
 
     lower, upper = (aligned_cylinders(fractions, phases, extreme(pick)) for pick in (min, max))
+    names = [field.name for field in fields(FibreBounds)]
+    pairs: dict[str, Any] = {name: (getattr(lower, name), getattr(upper, name)) for name in names}
     nu = min(lower.nu_axial, upper.nu_axial), max(lower.nu_axial, upper.nu_axial)
-    return FibreBounds(
-        E_axial=(lower.E_axial, upper.E_axial),
-        nu_axial=nu if len(phases) == 2 else None,
-        G_axial=(lower.G_axial, upper.G_axial),
-        G_transverse=(lower.G_transverse, upper.G_transverse),
-        K_transverse=(lower.K_transverse, upper.K_transverse),
-    )
+    return FibreBounds(**pairs | {"nu_axial": nu if len(phases) == 2 else None})
