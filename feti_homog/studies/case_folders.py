@@ -69,15 +69,6 @@ class CaseState:
     document: dict[str, Any] | None = None
 
 
-@dataclass(frozen=True)
-class SweepIndex:
-    """The content of sweep.json: name and stress unit of the sweep, and the list of all cases."""
-
-    name: str
-    stress_unit: str
-    entries: tuple[SweepCase, ...]
-
-
 def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
     """Refuse a folder that holds another study, or foreign files.  On one rank.
 
@@ -154,8 +145,8 @@ def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
 
 
-def read_index(directory: Path) -> SweepIndex:
-    """Read sweep.json of a sweep folder.  Raises CaseError if it is missing, unreadable or damaged."""
+def read_index(directory: Path) -> Sweep:
+    """Read sweep.json of a sweep folder, without cases.  Raises CaseError if it is missing, unreadable or damaged."""
     path = directory / INDEX_FILE
     try:
         document = result_json.loads(input_files.read(path).decode("utf-8"))
@@ -166,7 +157,7 @@ def read_index(directory: Path) -> SweepIndex:
         is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)
         if not is_sound or not all(0.0 < e.inputs.get(drawn, 0.5) < 1.0 for e in entries):
             raise TypeError("a name, number or input of a case is missing or of another type")
-        return SweepIndex(document["name"], document["stress_unit"], entries)
+        return Sweep(document["name"], document["stress_unit"], entries)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (AttributeError, ValueError, LookupError, TypeError) as error:

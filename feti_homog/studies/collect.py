@@ -16,6 +16,7 @@ from feti_homog.studies import case_folders
 from feti_homog.studies.axes import is_seed
 from feti_homog.studies.outputs import numbers, outputs
 from feti_homog.studies.predictions import responses
+from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.studies.sweep_table import PARTS, SweepTable
 
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
@@ -114,12 +115,12 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
     return [atomic.replace_text(directory / name, text) for name, text in texts.items()]
 
 
-def _index_and_states(directory: Path) -> tuple[case_folders.SweepIndex, list[case_folders.CaseState]]:
+def _index_and_states(directory: Path) -> tuple[Sweep, list[case_folders.CaseState]]:
     index = case_folders.read_index(directory)
     return index, [case_folders.case_state(directory, entry) for entry in index.entries]
 
 
-def _table(index: case_folders.SweepIndex, states: Sequence[case_folders.CaseState]) -> SweepTable:
+def _table(index: Sweep, states: Sequence[case_folders.CaseState]) -> SweepTable:
     documents = [state.document if state.status is case_folders.Status.DONE else None for state in states]
     place = {name: [getattr(entry, name) for entry in index.entries] for name in ("folder", "point", "realisation")}
     inputs = [entry.inputs for entry in index.entries]

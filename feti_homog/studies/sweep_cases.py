@@ -49,15 +49,12 @@ class SweepCase:
 
 @dataclass(frozen=True)
 class Sweep:
-    """The cases of a sweep file; `cases[k]` belongs to `entries[k]`."""
+    """The cases of a sweep; `cases[k]` belongs to `entries[k]`, and a sweep read from its folder has no `cases`."""
 
     name: str
+    stress_unit: str
     entries: tuple[SweepCase, ...]
-    cases: tuple[Case, ...]
-
-    @property
-    def stress_unit(self) -> str:
-        return self.cases[0].output.stress_unit
+    cases: tuple[Case, ...] = ()
 
 
 def load(path: str | Path) -> Sweep:
@@ -126,7 +123,7 @@ def cases_at(
     entries, parsed = zip(*checked, strict=True)
     if len({case.output.stress_unit for case in parsed}) > 1:
         raise CaseError("[output] stress_unit: expected the same in all cases, which share the tables")
-    return Sweep(name, entries, parsed)
+    return Sweep(name, parsed[0].output.stress_unit, entries, parsed)
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
