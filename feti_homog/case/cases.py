@@ -12,7 +12,7 @@ from typing import Any
 from feti_homog.case import bond_laws, cell_sizes, sections
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, labelled
-from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
+from feti_homog.case.load_sections import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, completed
 from feti_homog.case.material_sections import provider, read_materials, unlike_units
 from feti_homog.case.relations import axes_lines, read_interfaces, relation_faults, stress_free, unlike_strengths
 from feti_homog.case.rules import RULES, Rule
@@ -125,8 +125,8 @@ class Case:
 
     @property
     def section(self) -> AnalysisSection:
-        """Return the section of the analysis; `Stiffness()` for types without a section."""
-        return self.angle or self.path or self.single_load or self.envelope or Stiffness()
+        """Return the section of the analysis; `AnalysisSection()` for types without a section."""
+        return self.angle or self.path or self.single_load or self.envelope or AnalysisSection()
 
     def material_of(self, phase: str) -> material_forms.Material:
         """Return the material of a phase; without a section, "fibre:2" has the material "fibre".  Raises KeyError."""

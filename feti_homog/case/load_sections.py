@@ -103,7 +103,7 @@ def named(load: Strain | MixedLoad) -> dict[str, float]:
 
 
 class AnalysisSection:
-    """The section of an analysis; by default no bond breaks.
+    """The section of an analysis; by default no bond breaks, as for types of analysis without a section.
 
     Attributes:
         breaks: whether bonds may break under the loads of the analysis.
@@ -126,10 +126,6 @@ class AnalysisSection:
     def solves(self, loads: int, one_sided: bool) -> int:
         """Return the number of solves under `loads` unit loads; one-sided contact needs both signs of each load."""
         return 2 * loads if one_sided else loads
-
-
-class Stiffness(AnalysisSection):
-    """The analysis of the effective stiffness, which has no section in the file."""
 
 
 FAMILIES = (voigt.SPATIAL_STRESSES, voigt.SPATIAL_STRAINS)
