@@ -211,26 +211,23 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
     return CaseState(Status.FAILED, "; ".join(lines))
 
 
-def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
+def write_case_file(folder: Path, case: Case) -> None:
     """Write case.toml with defaults, without empty sections.  On one rank.  Raises FetiHomogError if that fails."""
     document = {name: table for name, table in case.resolved().items() if table != {}}
-    folder = directory / entry.folder
     atomic.remove_unfinished(folder, re.compile(rf"{CASE_FILE}|{ERROR_FILE}"))
     atomic.replace_text(folder / CASE_FILE, tomli_w.dumps(document))
 
 
-def reset(directory: Path, entry: SweepCase, status: Status) -> None:
+def reset(folder: Path, status: Status) -> None:
     """Remove error.txt and events of a case, and `set_aside` its result.  On one rank.  Raises FetiHomogError."""
-    folder = directory / entry.folder
     with atomic.file_errors("write", folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
     checkpoints.remove(folder)
-    set_aside(directory, entry, status)
+    set_aside(folder, status)
 
 
-def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
+def set_aside(folder: Path, status: Status) -> None:
     """Rename result.json to result.json.STATUS; remove other result files.  On one rank.  Raises FetiHomogError."""
-    folder = directory / entry.folder
     path = folder / result_json.NAME
     with atomic.file_errors("write", folder):
         if path.exists():
@@ -238,10 +235,10 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
         output_folder.remove_other_results(folder, ())
 
 
-def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
+def write_error(folder: Path, error: FetiHomogError) -> None:
     """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if that fails."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
-    atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
+    atomic.replace_text(folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:

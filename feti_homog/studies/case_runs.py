@@ -69,7 +69,7 @@ def run_all(
                 for entry in sweep.entries:
                     status = case_folders.case_state(directory, entry).status
                     if status.is_failure:
-                        case_folders.reset(directory, entry, status)
+                        case_folders.reset(directory / entry.folder, status)
 
             mpi_errors.on_root_only(comm, reset_failures)
         fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
@@ -204,12 +204,12 @@ class CaseRunner:
                 except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case only
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
-                    mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
+                    mpi_errors.on_root_only(self.comm, case_folders.write_error, folder, error)
                     status = f"failed ({error.faults[0]})"
                 except FetiHomogError:  # a file could not be written: the next run computes the case again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         damaged = case_folders.Status.DAMAGED
-                        mpi_errors.on_root_only(self.comm, case_folders.set_aside, self.directory, entry, damaged)
+                        mpi_errors.on_root_only(self.comm, case_folders.set_aside, folder, damaged)
                     raise
                 seconds, inputs = time.perf_counter() - start, entry.describe(case.output.stress_unit)
                 self._print(f"{entry.folder} of {len(self.sweep.entries)}: {status}, {seconds:.2f} s; {inputs}")
@@ -234,8 +234,8 @@ class CaseRunner:
         if state.status is case_folders.Status.DAMAGED:
             self._print(f"{entry.folder}: {state.reason}; set aside, the case is computed again")
         if state.status is not case_folders.Status.WAITING:
-            case_folders.reset(self.directory, entry, state.status)
-        case_folders.write_case_file(self.directory, entry, case)
+            case_folders.reset(folder, state.status)
+        case_folders.write_case_file(folder, case)
         return Outcome.COMPUTED, ""
 
     def _print(self, line: str) -> None:
