@@ -81,11 +81,6 @@ class Fit(Study):
         """Return the measured values of a test."""
         return [datum for datum in self.data if datum.test == test]
 
-    def rows_of(self, test: int) -> slice:
-        """Return the slice that the data of a test occupy among all data."""
-        first = next(k for k, datum in enumerate(self.data) if datum.test == test)
-        return slice(first, first + len(self.data_of(test)))
-
     def axes(self) -> str:
         """Return a remark on names in the data that mean something else in ply axes; "" without such names."""
         cases = self.first_cases().cases
@@ -240,7 +235,7 @@ class Evaluations:
         J, unknowns, tests = np.full((len(centre), len(key)), np.nan), self.fit.unknowns, range(len(self.fit.tests))
         for test, (k, name) in product(tests, enumerate(unknowns)):
             column = exact_derivatives(self.answers[key][test], self.fit.data_of(test), name)
-            J[self.fit.rows_of(test), k] = np.nan if column is None else column
+            J[[datum.test == test for datum in self.fit.data], k] = np.nan if column is None else column
         bounds = [(unknown.lower, unknown.upper) for unknown in unknowns.values()]
         widths = np.ptp(bounds, axis=1)
         noise = 1e-9 * (np.abs(centre) + [datum.std for datum in self.fit.data])  # rounding, and tolerance of solvers

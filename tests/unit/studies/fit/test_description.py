@@ -87,7 +87,6 @@ def test_tests_are_changes_of_one_case(tmp_path):
     cases = fit.at([77.0]).cases
     assert [case.cell.fibre_fraction for case in cases] == [0.3, 0.5]
     assert all(case.materials["fibre"].young == 77.0 and case.output.sensitivities for case in cases)
-    assert [fit.rows_of(test) for test in (0, 1)] == [slice(0, 1), slice(1, 2)]
 
 
 def test_the_load_of_a_test_replaces_the_load_of_the_case():
