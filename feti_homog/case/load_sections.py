@@ -6,23 +6,18 @@ A load gives the strain or the stress of each component; on a path, the previous
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import accumulate
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from feti_homog.case import section_values as kinds
 from feti_homog.materials import voigt
-from feti_homog.schema import key, keys, types
+from feti_homog.schema import key, types
 
 TEMPERATURE = "temperature"
 Strain = tuple[float, ...]
-
-
-def _strain(name: str, *only: keys.Condition) -> Any:
-    return key(types.real(), f"Macroscopic strain {name}.", default=None, only=only)
-
-
-def _stress(name: str, *only: keys.Condition) -> Any:
-    return key(types.real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
+strain_key = partial(key, types.real(), default=None)
+stress_key = partial(key, types.real(), unit="stress", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,18 +27,18 @@ class MixedLoad:
     On a path, a component that a load does not name keeps its last prescribed value; before, it is free of stress.
     """
 
-    E11: float | None = _strain("E11")
-    E22: float | None = _strain("E22")
-    E33: float | None = _strain("E33", kinds.GENERALIZED)
-    gamma23: float | None = _strain("gamma23", kinds.GENERALIZED)
-    gamma13: float | None = _strain("gamma13", kinds.GENERALIZED)
-    gamma12: float | None = _strain("gamma12")
-    S11: float | None = _stress("S11")
-    S22: float | None = _stress("S22")
-    S33: float | None = _stress("S33", kinds.GENERALIZED)
-    S23: float | None = _stress("S23", kinds.GENERALIZED)
-    S13: float | None = _stress("S13", kinds.GENERALIZED)
-    S12: float | None = _stress("S12")
+    E11: float | None = strain_key("Macroscopic strain E11.")
+    E22: float | None = strain_key("Macroscopic strain E22.")
+    E33: float | None = strain_key("Macroscopic strain E33.", only=kinds.GENERALIZED)
+    gamma23: float | None = strain_key("Macroscopic strain gamma23.", only=kinds.GENERALIZED)
+    gamma13: float | None = strain_key("Macroscopic strain gamma13.", only=kinds.GENERALIZED)
+    gamma12: float | None = strain_key("Macroscopic strain gamma12.")
+    S11: float | None = stress_key("Macroscopic stress S11.")
+    S22: float | None = stress_key("Macroscopic stress S22.")
+    S33: float | None = stress_key("Macroscopic stress S33.", only=kinds.GENERALIZED)
+    S23: float | None = stress_key("Macroscopic stress S23.", only=kinds.GENERALIZED)
+    S13: float | None = stress_key("Macroscopic stress S13.", only=kinds.GENERALIZED)
+    S12: float | None = stress_key("Macroscopic stress S12.")
     temperature: float | None = key(
         types.real(),
         "Change of temperature, 0 until a load names it. Every phase must give its expansion.",
