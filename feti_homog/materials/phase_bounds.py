@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from feti_homog.materials import engineering_constants
 from feti_homog.materials.engineering_constants import TransverseIsotropy
 from feti_homog.materials.laws import ISOTROPY
-from feti_homog.materials.material_forms import PER_TEMPERATURE
+from feti_homog.materials.material_forms import EXPANSION_PAIR, PER_TEMPERATURE
 from feti_homog.system.runtime import described, records
 from feti_homog.typing import Float
 
@@ -201,21 +201,16 @@ def aligned_cylinders(
     coupling = stiff * mean
     poisson = coupling / (2 * bulk)
     young = np.sum(c * (along - across**2 / x)) + coupling * mean - coupling**2 / bulk
-    table = engineering_constants.elastic_constants(young, poisson, dispersed(c, p, p0), shear, bulk)
-    strains: tuple[float | None, float | None] = (None, None)
+    elastic = engineering_constants.elastic_constants(young, poisson, dispersed(c, p, p0), shear, bulk)
+    table: dict[str, Any] = {name: float(value) for name, value in elastic.items()} | dict.fromkeys(EXPANSION_PAIR)
     if None not in (free := [expansions(phase) for phase in phases]):
         axial, transverse = np.array(free, dtype=float).T
         b, g = 2 * k * transverse + across * axial, 2 * across * transverse + along * axial
         B = np.sum(c * b / x)
         stresses = [B / np.sum(c / x), np.sum(c * (g - across * b / x)) + coupling * B]
         area, length = np.linalg.solve([[bulk, coupling], [coupling, young + coupling**2 / bulk]], stresses)
-        strains = float(length), float(area / 2)
-    return TransverseIsotropy(
-        **{name: float(value) for name, value in table.items()},
-        expansion_axial=strains[0],
-        expansion_transverse=strains[1],
-        deviation=0.0,
-    )
+        table |= zip(EXPANSION_PAIR, (float(length), float(area / 2)), strict=True)
+    return TransverseIsotropy(**table, deviation=0.0)
 
 
 def expansions(phase: TransverseIsotropy) -> Pair | None:
