@@ -84,10 +84,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     legs: dict[tuple[int, int], int] = {}
-    for leg, *place in path_curves.largest_of_legs(document):
-        legs.setdefault(
-            (place[0], place[1]), leg
-        )  # a leg that unloads may begin at the largest stress of the leg before
+    for leg, k, number in path_curves.largest_of_legs(document):
+        legs.setdefault((k, number), leg)  # a leg that unloads may begin at the largest stress of the leg before
     for (k, number), leg in legs.items():
         strain, stress = document["path"][number]["strain"][k], path_curves.stresses(document)[number, k]
         if strains[k] != peak["strain_name"] and stress:
