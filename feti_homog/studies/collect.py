@@ -88,16 +88,14 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
 
     Each file is replaced completely or not at all.  Raises FetiHomogError if a file cannot be written.
     """
-    columns = [*table.inputs.values()]
+    numbers_of_cases, progress = range(1, len(table.folder) + 1), (getattr(table, name) for name in CASE)
+    columns: list[Sequence[Any]] = [numbers_of_cases, *progress, *table.inputs.values()]
     for name, values in table.outputs.items():
         is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in point_tables.STATES))
         columns.append([int(v) if is_count and np.isfinite(v) else v for v in values.tolist()])
-    cases: list[list[Any]] = [["case", *CASE, *table.inputs, *table.outputs]]
-    for row, _ in enumerate(table.folder):
-        progress = [getattr(table, name)[row] for name in CASE]
-        cases.append([row + 1, *progress, *(values[row] for values in columns)])
+    cases: list[Sequence[Any]] = [["case", *CASE, *table.inputs, *table.outputs], *zip(*columns, strict=True)]
     inputs = [name for name in table.inputs if not is_seed(name)]
-    statistics: list[list[Any]] = [["point", *inputs, "output", "unit", *PARTS]]
+    statistics: list[Sequence[Any]] = [["point", *inputs, "output", "unit", *PARTS]]
     for number, point in enumerate(table.points):
         at_point = [point, *(table.input_of(point, name) for name in inputs)]
         for name in table.stated:
