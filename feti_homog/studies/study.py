@@ -124,9 +124,10 @@ class Study(ABC):
 
         def begin() -> None:  # the document has the digest from the start
             with case_folders.document_lock(directory):
-                if is_new := not path.exists():
+                if not path.exists():
                     with atomic.file_errors("write", directory):
                         case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
+                    atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
                 else:
                     try:
                         stored = result_json.loads(input_files.read(path).decode("utf-8"))
@@ -135,8 +136,6 @@ class Study(ABC):
                     if stored.get("digest") != head["digest"]:
                         raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
                 atomic.remove_unfinished(directory, self.ENTRIES)
-                if is_new:
-                    atomic.replace_text(path, result_json.dumps({**head, "status": "running"}))
 
         say = standard_streams.complain if comm.rank == 0 else lambda line: None
         with output_folder.held(directory, comm, say):
