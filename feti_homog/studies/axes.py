@@ -1,6 +1,6 @@
 """Read the points of a sweep: values of the keys that vary, combined as a grid or row by row, or random samples."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -44,12 +44,15 @@ class Axis:
         return [_of_key(value, self.path) for value in (np.exp(values) if self.log else values).tolist()]
 
 
-def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
+def read_points(table: object, faults: list[str]) -> tuple[list[Assignment], sections.SweepSection]:
     """Read the points and settings of a table [sweep].
 
     A point maps each key that varies to a value.  In a grid the last key in the file varies fastest; all sampled keys
     together are the last axis.  Each fault adds a line to `faults`; a faulty table gives no points.
     """
+    if not isinstance(table, dict):
+        faults.append(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
+        return [], sections.SweepSection()
     names = keys.keys_of(sections.SweepSection)
     reader = TableReader()
     given_settings = {name: value for name, value in table.items() if name in names}

@@ -74,11 +74,8 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     document = toml_files.to_document(values)
     if sections.SWEEP not in document:
         raise CaseError(f"[{sections.SWEEP}]: missing section; a single case is not a sweep")
-    table = document.pop(sections.SWEEP)
-    if not isinstance(table, dict):
-        raise CaseError(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
     faults: list[str] = []
-    points, settings = read_points(table, faults)
+    points, settings = read_points(document.pop(sections.SWEEP), faults)
     return cases_at(document, points, folder, settings.realisations, faults=faults)
 
 

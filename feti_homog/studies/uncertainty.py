@@ -133,13 +133,11 @@ def load(path: Path) -> ScatterStudy:
 def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
     """Build a study of scatter from a document, with file names relative to `folder`.  Raises CaseError like `load`."""
     document, faults = {"name": "case", **toml_files.to_document(values)}, list[str]()
-    table, settings = document.pop(sections.SWEEP, None), sections.SweepSection()
-    if isinstance(table, dict):
-        points, settings = read_points(table, faults)
+    settings = sections.SweepSection()
+    if sections.SWEEP in document:
+        points, settings = read_points(document.pop(sections.SWEEP), faults)
         if not faults and any(points):
             faults.append(f"[{sections.SWEEP}]: expected realisations alone")
-    elif table is not None:
-        faults.append(f"{sections.SWEEP} = {wording.toml_value(table)}: expected a section [{sections.SWEEP}]")
     uncertainty = read_uncertainty(document, faults)
     output = document.setdefault("output", {})
     if not isinstance(output, dict):
