@@ -37,9 +37,8 @@ def table(source: Path) -> str:
     columns = {"x": _words(x), "y": _words(y), "radius": _words(np.where(is_round, a, np.nan))}
     columns["phase"] = list(fibres.phases)
     if not (is_round | np.isnan(a)).all():
-        columns["a"] = _words(np.where(is_round, np.nan, a))
-        columns["b"] = _words(np.where(is_round, np.nan, b))
-        columns["angle"] = _words(np.where(is_round, np.nan, ellipses.angles))
+        for name, values in (("a", a), ("b", b), ("angle", ellipses.angles)):
+            columns[name] = _words(np.where(is_round, np.nan, values))
     if fibres.coatings.any():
         columns["coating"] = _words(fibres.coatings / fibres.radii)
     for name, values in fibres.others.items():
