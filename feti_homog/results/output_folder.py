@@ -49,10 +49,9 @@ def usable(directory: Path) -> None:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             os.stat(atomic.part_of(directory / LONGEST))  # raises an error if the name is too long
         existing = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
-        if existing.is_symlink() and not existing.exists():
-            raise CaseError(f"--out {directory}: expected a folder, but {existing} is a link that leads nowhere")
         if not existing.is_dir():
-            raise CaseError(f"--out {directory}: expected a folder, but {existing} is a file")
+            kind = "a file" if existing.exists() else "a link that leads nowhere"
+            raise CaseError(f"--out {directory}: expected a folder, but {existing} is {kind}")
         if not os.access(existing, os.W_OK | os.X_OK):
             raise CaseError(f"--out {directory}: expected a folder that can be written to; {existing} cannot")
     except OSError as error:
