@@ -41,10 +41,8 @@ class SweepCase:
 
     def describe(self, stress_unit: str) -> str:
         """Return a line with the inputs of the case and their units."""
-        texts = []
-        for name, value in self.inputs.items():
-            texts.append(f"{name} = {wording.toml_value(value)} {tables.unit(name, stress_unit)}".rstrip())
-        return ", ".join(texts)
+        words = {name: wording.toml_value(value) for name, value in self.inputs.items()}
+        return ", ".join(f"{name} = {word} {tables.unit(name, stress_unit)}".rstrip() for name, word in words.items())
 
 
 @dataclass(frozen=True)
