@@ -13,7 +13,6 @@ from feti_homog.report.plots import plot_helpers
 from feti_homog.report.text.tables import unit, with_unit
 from feti_homog.studies import case_folders, collect, pictures
 from feti_homog.studies.outputs import numbers, outputs
-from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.studies.sweep_table import Statistics, series_over
 
 
@@ -102,7 +101,7 @@ def test_each_case_is_listed_by_its_status_and_done_ones_alone_count(tmp_path, m
     """A running path has numbers in its row; a refused or damaged result has none in any table."""
     states = {status: (f"because {status}", path_document(2, 0.0)) for status in case_folders.Status}
     entries = [case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k, _ in enumerate(states, start=1)]
-    index = Sweep("test", "GPa", tuple(entries))
+    index = case_folders.Sweep("test", "GPa", tuple(entries))
     found = [case_folders.CaseState(status, *more) for status, more in states.items()]
     monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
     first, *lines = collect.collect(tmp_path, pictures=False)
@@ -123,7 +122,7 @@ def test_notes_that_differ_in_numbers_alone_are_printed_once(tmp_path, monkeypat
     entries = tuple(case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k in (1, 2, 3))
     status = [case_folders.Status.DONE, case_folders.Status.DONE, case_folders.Status.WAITING]
     found = [case_folders.CaseState(*pair) for pair in zip(status, [""] * 3, documents, strict=True)]
-    index = Sweep("test", "GPa", entries)
+    index = case_folders.Sweep("test", "GPa", entries)
     monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
     assert [line for line in collect.collect(tmp_path, pictures=False) if "case-000" in line] == [
         "warning: case-0001: rtol (2 cases)",

@@ -10,7 +10,6 @@ from scipy import stats
 from support.sweep_tables import collected, path_document
 
 from feti_homog.studies import case_folders, collect, pictures
-from feti_homog.studies.sweep_cases import Sweep
 from feti_homog.studies.sweep_table import Statistics
 
 
@@ -99,7 +98,7 @@ def test_paths_whose_stress_does_not_fall_are_counted(tmp_path, monkeypatch, ris
     entries = tuple(case_folders.SweepCase(k, 1, k, {"cell.seed": k}, "") for k in (1, 2))
     documents = [*[short] * rising, *[falling] * (2 - rising)]
     found = [case_folders.CaseState(case_folders.Status.DONE, "", document) for document in documents]
-    index = Sweep("test", "GPa", entries)
+    index = case_folders.Sweep("test", "GPa", entries)
     monkeypatch.setattr(collect, "_index_and_states", lambda _: (index, found))
     remark = f"remark: {rising} of 2 paths end before their stress falls: load them further for a peak"
     assert collect.collect(tmp_path, pictures=False).count(remark) == (rising > 0)
