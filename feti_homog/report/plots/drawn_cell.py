@@ -63,7 +63,7 @@ class InterfaceEdges:
         Returns legend lines of drawn states.  Colours of damaged edges show the larger damage of their ends in tenths.
         """
         states = self.state(states_of_nodes(state))
-        damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0) if "damage" in state else np.zeros(len(states))
+        damage = state["damage"][:][self.nodes].max(axis=1, initial=0.0)
         present = [kind for kind in STATE_NAMES if (states == kind).any()]
         for kind in present:
             segments = points[self.edges[states == kind]]
@@ -98,8 +98,7 @@ class DrawnCell:
 def states_of_nodes(state: Any) -> Array:
     """Return the interface node states (k,) in a state of result.h5.  Damaged bonds that hold are DAMAGED."""
     status = state["status"][:]
-    damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
-    return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
+    return np.asarray(np.where((status == BONDED) & (state["damage"][:] > 0.0), DAMAGED, status))
 
 
 def damage_colour(damage: float) -> Any:

@@ -34,8 +34,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
     """Draw tractions, jumps and damage, a row per fibre: up to four most damaged fibres, or else the most loaded."""
     file, names = cell.file, _chosen_states(cell.file, document)
     fibre, last_state = file["interface/fibre"][:], file[f"state/{names[-1]}"]
-    status = last_state["status"][:]
-    damage = last_state["damage"][:] if "damage" in last_state else np.zeros(len(status))
+    status, damage = last_state["status"][:], last_state["damage"][:]
     is_partial = ((damage > 0.0) & (damage < 1.0)).any()
     quantities = ["traction", "jump", "damage"] if is_partial else ["traction", "jump"]
     harm = np.maximum(damage, status != drawn_cell.BONDED)
