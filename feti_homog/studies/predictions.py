@@ -136,9 +136,8 @@ def predicted(document: path_curves.Document, data: Sequence[Datum]) -> Float:
         ways["peak"] = "; the path ends before its stress falls: load it further"
     missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:
-        reasons = (ways.get(name.partition("_")[0], "") for name in missing)
-        lines = (f"[measured] {name}: this result has no such value" for name in missing)
-        raise CaseError(*(f"{line}{reason}" for line, reason in zip(lines, reasons, strict=True)))
+        reasons = [(name, ways.get(name.partition("_")[0], "")) for name in missing]
+        raise CaseError(*(f"[measured] {name}: this result has no such value{reason}" for name, reason in reasons))
     return np.array([values[d.name] if d.strain is None else _on_curve(document, d) for d in data])
 
 
