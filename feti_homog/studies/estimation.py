@@ -18,6 +18,7 @@ from feti_homog.typing import Array, Float
 
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 CONFIDENCE = 0.95
+QUANTILE = float(norm.ppf((1 + CONFIDENCE) / 2))
 LEAST_CHANCE = 1e-3  # probability of such or larger residuals, below which the model is refused
 # Directions with a smaller relative singular value are undetermined; smaller entries of a direction are rounding.
 RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
@@ -83,7 +84,7 @@ class ParameterEstimates:
     @property
     def half_width(self) -> Float:
         """The half widths (n,) of the confidence intervals (level CONFIDENCE); inf for undetermined unknowns."""
-        return np.asarray(norm.ppf((1 + CONFIDENCE) / 2) * self.std)
+        return np.asarray(QUANTILE * self.std)
 
     @property
     def correlation(self) -> Float:
@@ -156,9 +157,8 @@ def with_ranges(
     other unknowns stay; the longer side counts.  Where values jump, derivatives know nothing about the range.
     `residuals` is inf without values.
     """
-    x, quantile, J = estimates.x, float(norm.ppf((1 + CONFIDENCE) / 2)), estimates.jacobian.copy()
-    tiny = float(np.finfo(float).tiny)
-    limit = estimates.residuals @ estimates.residuals + quantile**2
+    x, J, tiny = estimates.x, estimates.jacobian.copy(), float(np.finfo(float).tiny)
+    limit = estimates.residuals @ estimates.residuals + QUANTILE**2
 
     def moved(k: int, step: float) -> Float:
         return residuals(np.where(np.arange(len(x)) == k, x + step, x))
@@ -170,7 +170,7 @@ def with_ranges(
     for k, size in enumerate(_sizes(x)):
         slope, ends, widths = max(float(np.linalg.norm(J[:, k])), tiny), list[Float](), list[float]()
         for side, most in ((-1, x[k] - bounds[0][k]), (1, bounds[1][k] - x[k])):
-            inside, outside = 0.0, min(quantile / slope / np.sqrt(2.0), most)
+            inside, outside = 0.0, min(QUANTILE / slope / np.sqrt(2.0), most)
             while is_within(k, side * outside) and inside < most:
                 inside, outside = outside, min(2.0 * outside, most)
             while inside < outside / 2 and outside > STEP * size:
@@ -181,9 +181,9 @@ def with_ranges(
             widths += [(inside + outside) / 2] if inside < outside else []
         if not widths:  # the range has no end
             J[:, k] = 0.0
-        elif not 0.8 < max(widths) * slope / quantile < 1.25:  # more than the steps in search of the ends
+        elif not 0.8 < max(widths) * slope / QUANTILE < 1.25:  # more than the steps in search of the ends
             secant = ends[1] - ends[0]
-            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * quantile / max(widths)
+            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * QUANTILE / max(widths)
     ranged = summarize(x, estimates.computed, measured, J * measured[1][:, None], bounds)
     return replace(ranged, evaluations=estimates.evaluations, converged=estimates.converged)
 

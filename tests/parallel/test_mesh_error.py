@@ -67,10 +67,8 @@ def test_true_errors_are_near_their_estimates(comm, order, known, interface):
 @pytest.mark.parametrize("order", [1, 2])
 def test_stiff_springs_beside_soft_ones_do_not_raise_the_estimate(comm, order):
     """A slip that turns with the normal: between nodes, an interpolated jump opens stiff normal springs."""
-    fine, coarse = (
-        result(comm, cell={"order": order, "mesh_size": 0.1, "refine": refine}, interface=springs(1e6, 1.0))
-        for refine in (2, 0)
-    )
+    mesh, bonds = {"order": order, "mesh_size": 0.1}, springs(1e6, 1.0)
+    fine, coarse = (result(comm, cell=mesh | {"refine": refine}, interface=bonds) for refine in (2, 0))
     true = np.diag(np.abs(fine.effective_stiffness - coarse.effective_stiffness))[:2]
     ratio = np.diag(coarse.mesh_error.effective_stiffness)[:2] / true
     assert (ratio > 0.5).all() and (ratio < 5.0).all()
