@@ -168,11 +168,7 @@ def _recovered(
     # For groups with one phase: members, mesh, displacements (classes, c, k), and positions (c classes,) as in `Group`.
     solved = list[tuple[list[Subdomain] | list[UniformPart], FineMesh, Float, Int]]()
     if is_nested and not across:
-        for interior in nested_interiors(boundary, cell.lattice, lattice):
-            displacement = interior.displacement(u, loads)
-            position = np.full(displacement.shape[0] * displacement.shape[1], NONE)
-            position[interior.fixed] = interior.place
-            solved.append((interior.members, interior.mesh, displacement, position))
+        solved += nested_interiors(boundary, cell.lattice, lattice, u, loads)
     else:
         inside = np.stack([response.inside for response in with_displacements(cell, responses)], axis=1)
         numbered = np.arange(len(inside)) if across else boundary.local_dofs

@@ -130,38 +130,6 @@ class ForcesBetweenParts:
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
 
 
-@dataclass(frozen=True)
-class NestedInterior:
-    """The factored stiffness of interiors on a coarser mesh, for a group of subdomains with one phase.
-
-    Attributes:
-        members: subdomains.
-        mesh: joined mesh of the subdomains, with c displacements per node.
-        fixed: prescribed displacements, as dofs of `mesh`: on the boundary, and 0 where a class is pinned.
-        place: (fixed,) positions among the displacements on all boundaries; NONE where a class is pinned.
-        interior: factor for the free displacements.
-        loads: (free, v) unit load forces Q on free displacements; None without voids or prescribed side tractions.
-    """
-
-    members: list[Subdomain]
-    mesh: FineMesh
-    fixed: Int
-    place: Int
-    interior: one_subdomain.Interior
-    loads: Float | None
-
-    def displacement(self, u: Float, loads: Float) -> Float:
-        """Extend u (boundary dofs, k) under the loads (v, k) to u* (classes, c, k) at all nodes of the coarser mesh."""
-        problem = self.members[0].problem
-        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # NONE takes the last row
-        all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
-        all_dofs[self.fixed] = on_boundary
-        all_dofs[self.interior.dofs] = self.interior.extend(on_boundary)
-        if self.loads is not None:
-            all_dofs[self.interior.dofs] -= self.interior.solve(self.loads @ loads)
-        return all_dofs.reshape(-1, problem.components, u.shape[1])
-
-
 def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
     """Return whether any phase is nearly incompressible, so that coarse elements lock.  Collective."""
     locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
@@ -169,10 +137,19 @@ def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) ->
 
 
 def nested_interiors(
-    boundary: interface_operators.InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
-) -> Iterator[NestedInterior]:
-    """Yield the `NestedInterior` of each group of this rank's subdomains, on the lattice `coarser`."""
-    nested, inside = coarser.within(lattice), NONE - 1
+    boundary: interface_operators.InterfaceOperators,
+    lattice: ReferenceLattice,
+    coarser: ReferenceLattice,
+    u: Float,
+    loads: Float,
+) -> Iterator[tuple[list[Subdomain], FineMesh, Float, Int]]:
+    """Extend u (boundary dofs, k) under the loads (v, k) to u* on the lattice `coarser`, for groups with one phase.
+
+    Yields the subdomains of each group, their joined mesh with c displacements per node, u* (classes, c, k), and the
+    positions (c classes,) of these displacements among those on all boundaries: NONE inside, and where a class is
+    pinned, so that u* = 0.
+    """
+    nested, inside, of_place = coarser.within(lattice), NONE - 1, np.vstack([u, np.zeros((1, u.shape[1]))])
     for group in groups(boundary.subdomains, coarser):
         members = [boundary.subdomains[k] for k in group]
         meshes = [refinement.refine(s.submesh, coarser) for s in members]
@@ -186,13 +163,15 @@ def nested_interiors(
             numbers.append(of_fine[s.problem.dofs(fine)])
         position = np.concatenate(numbers)
         fixed = np.flatnonzero(position != inside)
-        mesh = refinement.joined(meshes)
+        position[position == inside] = NONE
+        mesh, displacement = refinement.joined(meshes), of_place[position]  # NONE takes the last row
         body = assembly.assemble(mesh, first.L, first.problem, first.is_mixed)
-        interior = one_subdomain.Interior(body.K, fixed)
+        interior, load = one_subdomain.Interior(body.K, fixed), None
         sides = [assembly.side_loads(s.submesh, mesh, s.problem) for s, mesh in zip(members, meshes, strict=True)]
-        Q = np.hstack([body.Q, np.concatenate(sides)])
-        loads = Q[interior.dofs] if sides[0].size or any(s.submesh.at_void.any() for s in members) else None
-        yield NestedInterior(members, mesh, fixed, position[fixed], interior, loads)
+        if sides[0].size or any(s.submesh.at_void.any() for s in members):
+            load = np.hstack([body.Q, np.concatenate(sides)])[interior.dofs] @ loads
+        displacement[interior.dofs] = interior.extend(displacement[fixed], load)
+        yield members, mesh, displacement.reshape(-1, first.problem.components, u.shape[1]), position
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:

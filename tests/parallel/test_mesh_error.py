@@ -252,13 +252,14 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     k, nested = len(responses), cell.nested_lattice.within(cell.lattice)
     fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
     largest = 0.0
-    for interior in nested_interiors(cell.solver.interface_operators, cell.lattice, cell.nested_lattice):
-        coarse, first = interior.displacement(u, loads), 0
-        for s in interior.members:
+    operators = cell.solver.interface_operators
+    for members, mesh, coarse, _ in nested_interiors(operators, cell.lattice, cell.nested_lattice, u, loads):
+        first = 0
+        for s in members:
             there = next(fine).reshape(-1, 2, k)[s.mesh.node_class[s.mesh.nodes[:, nested]]]
-            triangles = interior.mesh.nodes[first : first + len(there)]
+            triangles = mesh.nodes[first : first + len(there)]
             first += len(there)
-            largest = max(largest, np.abs(coarse[interior.mesh.node_class[triangles]] - there).max())
+            largest = max(largest, np.abs(coarse[mesh.node_class[triangles]] - there).max())
     assert largest < 0.02 * np.abs(u).max()
     assert next(fine, None) is None
     cell.destroy()
