@@ -25,7 +25,8 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
     with options_database.case_options(case.petsc):
         lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
         part = tile_tearing.cut(case, lattice, comm, partition_policy.BY_COST)
-        constraints = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
+        pairs = cell_remarks.pairs_of(case, part.summary.phases)
+        constraints = shared_entities.share_entities(comm, part.submeshes, part.table, pairs, lattice).constraints
         inner, parts = lattice.intervals - 1, map(refinement.halved, part.submeshes.cut())
         nodes = sum(len(s.class_keys) + inner * (len(s.edge_keys) + (inner - 1) * len(s.triangles) // 2) for s in parts)
         counts = comm.gather((len(part.submeshes.index), nodes)) or []

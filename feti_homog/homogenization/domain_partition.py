@@ -110,13 +110,11 @@ class RankShare:
 
     Attributes:
         summary, table: data of the whole cell and of its subdomains.
-        pairs: (phases, phases) as in `cell_remarks.pairs_of`.
         submeshes: the rank's submeshes.
     """
 
     summary: CellSummary
     table: submeshes.SubdomainTable
-    pairs: Int
     submeshes: SubmeshesOfRank
 
 
@@ -177,7 +175,7 @@ def distribute(
         interface_nodes=bonds if across else None,
     )
     shares = submeshes.cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned)
-    return [RankShare(summary, table, pairs, part) for part in shares]
+    return [RankShare(summary, table, part) for part in shares]
 
 
 def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triangles: int) -> CellSummary:

@@ -131,7 +131,7 @@ def tear_by_tiles(
 
     Raises CaseError and MeshError on every rank, as in `tiled_cell` and `tile_filling.fill`.
     """
-    phase_pairs, nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
+    nesting, edges = mpi_errors.on_root(comm, tiled_cell, case, noded)
     regions: tiling.Regions = comm.bcast(None if noded is None else noded.regions)
     of_rank = filled_tiles(() if noded is None else noded.parts, comm)
     inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, _, filling in of_rank])))
@@ -163,7 +163,7 @@ def tear_by_tiles(
     pinned = np.array([key])
     shares = mpi_errors.agree(comm, lambda: list(submeshes.cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = mpi_errors.on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
-    return RankShare(summary, table, phase_pairs, submeshes.joined(distributed_arrays.alltoall(comm, shares)))
+    return RankShare(summary, table, submeshes.joined(distributed_arrays.alltoall(comm, shares)))
 
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
@@ -203,12 +203,12 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
     return partition.assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
 
 
-def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]:
-    """Return the interface numbers, nesting and edge counts of a tiled cell.
+def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int]:
+    """Return the nesting and edge counts of a tiled cell.
 
     Returns:
-        Interface numbers (phases, phases), see `cell_remarks.pairs_of`; nesting (constituents,) as `Torus.nesting`;
-        and the number (constituents,) of coarse edges between each constituent and others.
+        Nesting (constituents,) as `Torus.nesting`, and the number (constituents,) of coarse edges between each
+        constituent and others.
 
     Raises:
         CaseError: an interface is between phases that do not touch, or that the cell lacks.
@@ -228,5 +228,4 @@ def tiled_cell(case: Case, noded: gmsh_mesher.NodedCell) -> tuple[Int, Int, Int]
     sides = np.stack([regions.constituent[side[arcs]] for side in (curves.inside, curves.outside)])
     shared = (sides >= 0).all(axis=0)
     count = np.diff(curves.first)[arcs] - 1
-    edges = np.bincount(sides[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
-    return cell_remarks.pairs_of(case, regions.phases), nesting, edges
+    return nesting, np.bincount(sides[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)

@@ -246,8 +246,8 @@ def assemble_subdomains(
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as line:
         part = cut(case, lattice, comm, policy)
-        summary = part.summary
-        shared = shared_entities.share_entities(comm, part.submeshes, part.table, part.pairs, lattice)
+        summary, pairs = part.summary, cell_remarks.pairs_of(case, part.summary.phases)
+        shared = shared_entities.share_entities(comm, part.submeshes, part.table, pairs, lattice)
         pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
         line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {pieces}")
 
