@@ -63,17 +63,6 @@ class CellLoads:
         pairs = zip(self.problems, state.problems, strict=True)
         return [problem.response(part, scale, brief) for problem, part in pairs]
 
-    def undetermined(self, responses: Sequence[averaging.Response]) -> list[str]:
-        """Name the strains that the load of the responses (one for each problem) leaves undetermined.  Collective."""
-        pairs = zip(self.problems, responses, strict=True)
-        masks = np.concatenate([problem.interface.undetermined(response.state) for problem, response in pairs])
-        return [name for name, is_free in zip(self.names, masks, strict=True) if is_free]
-
-    def excess(self, responses: Sequence[averaging.Response]) -> float:
-        """Return the largest ratio of a response's strain to the bonded cell's strain under the same load."""
-        pairs = zip((problem.interface.scales for problem in self.problems), (r.state for r in responses), strict=True)
-        return max(scales.excess(state.solution.strain, state.asked) for scales, state in pairs)
-
     def secants(self, responses: Sequence[averaging.Response], sign: float) -> dict[str, Float]:
         """Assemble the secant `stiffness`, Eq. (39), and the `thermal_stress` (6,).
 
@@ -106,7 +95,6 @@ class AnalysisContext:
         directory: folder of the result, where path events are stored; None without files.
         resume: whether a path continues from the checkpoint.
         log: function that receives a line about each path event.
-        events: name of the file with the lines about all path events.
         opening: returns, as text, the entries of result.json that are known before the analysis.  Collective.
         undetermined: names of undetermined strains; `loaded_point` adds a list for each point.
         excess: largest ratio of strains under one load to strains of the bonded cell, over all loaded points.
@@ -120,7 +108,6 @@ class AnalysisContext:
     directory: Path | None = None
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
-    events: str = "result.path"
     opening: Callable[[AnalysisContext], str] = lambda context: "{}"
     undetermined: list[list[str]] = field(default_factory=list)
     excess: float = 0.0
@@ -249,8 +236,11 @@ class AnalysisContext:
 
         Also appends the undetermined strains of the point to `undetermined`, and updates `excess`.
         """
-        self.undetermined.append(self.loads.undetermined(responses))
-        self.excess = max(self.excess, self.loads.excess(responses))
+        pairs = [(problem.interface, r.state) for problem, r in zip(self.loads.problems, responses, strict=True)]
+        masks = np.concatenate([interface.undetermined(state) for interface, state in pairs])
+        self.undetermined.append([name for name, is_free in zip(self.loads.names, masks, strict=True) if is_free])
+        excesses = [interface.scales.excess(state.solution.strain, state.asked) for interface, state in pairs]
+        self.excess = max(self.excess, *excesses)
         in_springs = sum(response.in_springs for response in responses)
         energies = {"stored": sum(response.stored for response in responses), "stored_in_springs": in_springs}
         iterations = sum(response.state.iterations for response in responses)

@@ -19,7 +19,7 @@ from feti_homog.interface.friction import coulomb_faces, sliding_cell
 from feti_homog.interface.laws import BondLaw
 from feti_homog.interface.path import coulomb_leg, frictionless_leg, path_following, path_points
 from feti_homog.materials import voigt
-from feti_homog.results import checkpoints, landmarks, path_curves
+from feti_homog.results import checkpoints, landmarks, path_curves, result_json
 from feti_homog.system.runtime import records, standard_streams
 
 OF_FIBRES = ("debonded_length", "debonding_angle")  # lists over fibres, kept at points whose fields are kept
@@ -81,7 +81,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
                 break
     if last is None:
         return {"resumed": count, "path": ()}
-    context.progress.say(f"  {points} in {context.events}")
+    context.progress.say(f"  {points} in {result_json.LOG if context.directory else 'result.path'}")
     return {"resumed": count} | _completed(context, path, law, entries, bonds, last)
 
 

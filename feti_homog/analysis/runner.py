@@ -127,7 +127,7 @@ def _run_and_write(
         context = AnalysisContext.of(cell, progress, states)
         # No function in the context may refer to the context: garbage collection on one rank would then close the
         # parallel file, which is a collective call.
-        context = replace(context, directory=directory, resume=resume, log=log.write, events=result_json.LOG)
+        context = replace(context, directory=directory, resume=resume, log=log.write)
         context.opening = lambda itself: result_json.text_of(records.plain(_opening(itself)))
         analysis = _analyse(context)
         seal = states.seal()
