@@ -93,7 +93,6 @@ class StateRecorder:
     """A recorder of states and of the largest phase stresses.  Fields go to `file`, if any, and to memory if `keep`.
 
     Attributes:
-        has_place: whether fields are recorded.
         is_recording: whether states are recorded, for fields or for the utilisation of strengths.
         singularities: descriptions of points near which the largest stresses have no limit.
         error: the error of the first failed write, after which the run continues without the file; else None.
@@ -105,9 +104,8 @@ class StateRecorder:
         self._cell, self._file, self._keep = cell, file, keep
         self._number, self._states, self._say = 0, list[field_layout.StatePart](), say
         self._largest, self._labels = list[dict[str, recovered_fields.Largest]](), list[str]()
-        self.has_place = keep or file is not None
         has_strength = any(material.strength for material in cell.case.materials.values())
-        self.is_recording = self.has_place or has_strength
+        self.is_recording = keep or file is not None or has_strength
         self.error: FetiHomogError | None = None
         self.singularities = set[str]()
 
