@@ -30,7 +30,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
         inner, parts = lattice.intervals - 1, map(refinement.halved, part.submeshes.cut())
         nodes = sum(len(s.class_keys) + inner * (len(s.edge_keys) + (inner - 1) * len(s.triangles) // 2) for s in parts)
         counts = comm.gather((len(part.submeshes.index), nodes)) or []
-        cell, summary, options = case.cell, part.summary, solver_plan.database_options()
+        cell, summary = case.cell, part.summary
         components = [problem.components for problem in phase_laws.problems(case)]
 
         def lines() -> Iterator[str]:
@@ -47,7 +47,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
             yield from _fibre_lines(case, summary)
             pieces = f"{summary.subdomains} subdomain{'s' if summary.subdomains > 1 else ''}"
             yield f"tearing    {summary.bodies} bodies, {pieces}, {sum(components) * constraints} multipliers"
-            yield from _cost_lines(case, summary, components[0] * constraints, options, subdomains, nodes)
+            yield from _cost_lines(case, summary, components[0] * constraints, subdomains, nodes)
             unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge, summary.radii)
             yield from (f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved))
             yield from (f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks))
@@ -57,19 +57,15 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
 
 
 def _cost_lines(
-    case: Case,
-    summary: domain_partition.CellSummary,
-    multipliers: int,
-    options: solver_plan.SolverOptions,
-    subdomains: Sequence[int],
-    nodes: Sequence[int],
+    case: Case, summary: domain_partition.CellSummary, multipliers: int, subdomains: Sequence[int], nodes: Sequence[int]
 ) -> Iterator[str]:
     """Yield lines about the solver, ranks and memory; for a path also memory for complete debonding.
 
     `subdomains` and `nodes` have a count for each rank.  Raises CaseError for PETSc options that exclude each other,
     and for a solver without influence columns in a case with friction.
     """
-    problems, ranks, is_dense = phase_laws.problems(case), len(nodes), options.operator != "implicit"
+    problems, ranks, options = phase_laws.problems(case), len(nodes), solver_plan.database_options()
+    is_dense = options.operator != "implicit"
     has_thin = phase_names.COATING in case.materials and not summary.across
     one_each = summary.across and ranks > 1 and set(subdomains) == {1}
     applications = max(partition_policy.applications(case, problem, summary.across) for problem in problems)
