@@ -152,10 +152,7 @@ def mesh_error(
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
     """Note which mesh suffices if `energy`, the relative energy error on rank 0, is above `accuracy`.  Collective."""
     cell = context.case.cell
-    if cell.accuracy is None:
-        return
-    energy = context.cell.comm.bcast(energy)
-    if energy <= cell.accuracy:
+    if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
     finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
     line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
