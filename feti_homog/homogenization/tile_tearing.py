@@ -87,11 +87,9 @@ def fill_tiles(cell: gmsh_mesher.NodedCell | CoarseMesh | None, comm: Intracomm)
     filled = filled_tiles(cell.parts if isinstance(cell, gmsh_mesher.NodedCell) else (), comm)
     gathered = distributed_arrays.gather(comm, [(k, filling) for k, _, filling in filled])
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=lambda part: part[0])]
-
-    def joined(cell: gmsh_mesher.NodedCell | CoarseMesh) -> CoarseMesh:
-        return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
-
-    return mpi_errors.on_root_only(comm, joined, cell)
+    return mpi_errors.on_root_only(
+        comm, lambda: cell.mesh(fillings) if isinstance(cell, gmsh_mesher.NodedCell) else cell
+    )
 
 
 def filled_tiles(
