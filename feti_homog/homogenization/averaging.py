@@ -253,9 +253,7 @@ class FibreInterfaces:
 
     def __init__(self, cell: TornCell) -> None:
         """Sum the interface lengths of each fibre.  Collective."""
-        self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
-        self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
-        self._numbers = cell.summary.numbers
+        self._cell, self._nodes, self._numbers = cell, cell.solver.jump_operator.nodes, cell.summary.numbers
         self._fibre = self._numbers[self._nodes.fibre] - 1
         self._length = self.length(np.ones(len(self._fibre), bool))
         of_coating = self.length(~cell.summary.is_fibre[self._nodes.fibre])
@@ -265,14 +263,14 @@ class FibreInterfaces:
 
     def length(self, which: Bool) -> Float:
         """Sum the interface length of each fibre (f,) over the nodes in the mask `which` (k,).  Collective."""
-        sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._fibres).astype(float)
-        return distributed_arrays.allreduce_sum(self._comm, sums)
+        sums: Float = np.bincount(self._fibre, self._nodes.length * which, self._cell.summary.fibres).astype(float)
+        return distributed_arrays.allreduce_sum(self._cell.comm, sums)
 
     def loose(self, status: Status) -> list[int]:
         """List the numbers, from 1, of fibres with an interface on which no bond is intact.  Collective."""
         inner, count = self._nodes.fibre, len(self._numbers)
         lengths = [np.bincount(inner, self._nodes.length * which, count) for which in (status == Contact.BONDED, 1.0)]
-        bonded, length = distributed_arrays.allreduce_sum(self._comm, np.stack(lengths))
+        bonded, length = distributed_arrays.allreduce_sum(self._cell.comm, np.stack(lengths))
         return [int(number) for number in np.unique(self._numbers[(bonded == 0.0) & (length > 0.0)])]
 
     def angle(self, length: Float) -> Float:
@@ -286,8 +284,8 @@ class FibreInterfaces:
     def shares(self, status: Status) -> Float:
         """Return the debonded length fraction (i,) of each [[interface]] section, 0 without nodes.  Collective."""
         weights = np.stack([self._nodes.length, self._nodes.length * (status != Contact.BONDED)])
-        sums = [np.bincount(self._nodes.pair, row, self._pairs).astype(float) for row in weights]
-        length, debonded = distributed_arrays.allreduce_sum(self._comm, np.stack(sums))
+        sums = [np.bincount(self._nodes.pair, row, len(self._cell.case.interfaces)).astype(float) for row in weights]
+        length, debonded = distributed_arrays.allreduce_sum(self._cell.comm, np.stack(sums))
         return np.asarray(debonded / np.where(length > 0, length, 1.0))
 
 
