@@ -111,7 +111,7 @@ def _points(
 ) -> Iterator[tuple[path_points.Point, path_events.Before | None, list[averaging.Response]]]:
     """Yield (point, `Before` or None, responses) along the path.  Collective.
 
-    First come the `stored_events` of the checkpoint, each with the result of `path_events.restored`, then new points
+    First come the `stored_events` of the checkpoint, each with the `Before` of `path_events.read`, then new points
     with None.  The path ends with a fault where the cell no longer carries the stresses, or friction has no
     equilibrium.  Raises NotCarriedError if the cell does not carry the stresses of the first point.
     """
@@ -119,10 +119,8 @@ def _points(
     begin = path_points.unloaded(cell, context.bonds(None))
     responses: list[averaging.Response] = []
     for number in range(stored_events):
-        event = context.checkpoint.read(number)
-        point, before = path_events.restored(event, cell)
-        if number == stored_events - 1 and "lam" not in event:  # the path continues from this point
-            point = path_events.found_again(point, cell)
+        is_last = number == stored_events - 1  # the path continues from this point
+        event, point, before = path_events.read(context, number, solves=is_last)
         begin, responses = point.after, path_events.averages(event, point, context.loads)
         yield point, before, responses
     engine: type[frictionless_leg.FrictionlessLeg] | partial[coulomb_leg.CoulombLeg] = frictionless_leg.FrictionlessLeg

@@ -110,7 +110,7 @@ def stored(
 def restored(event: checkpoints.Arrays, cell: coupled_interfaces.CoupledInterfaces) -> tuple[path_points.Point, Before]:
     """Rebuild a path point, and its `Before`, from a checkpoint event.
 
-    Multipliers, jumps and amplitudes for which the checkpoint had no room are empty; `found_again` computes them.
+    Multipliers, jumps and amplitudes for which the checkpoint had no room are empty; `read` computes them.
     """
     states = list[Equilibrium]()
     for suffix, interface in zip(SUFFIXES, cell.problems, strict=False):
@@ -153,22 +153,21 @@ def averages(event: checkpoints.Arrays, point: path_points.Point, loads: CellLoa
     return responses
 
 
-def found_again(point: path_points.Point, cell: coupled_interfaces.CoupledInterfaces) -> path_points.Point:
-    """Solve the equilibrium of a point again, for an event without multipliers; return the point.  Collective."""
-    loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
-    values, by_stress = zip(*loads, strict=True)
-    load = Load(np.concatenate(values), np.concatenate(by_stress))
-    state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
-    return replace(point, state=state, after=replace(point.after, lam=state.multipliers))
+def read(
+    context: AnalysisContext, number: int, solves: bool = True
+) -> tuple[checkpoints.Arrays, path_points.Point, Before]:
+    """Read event `number`, and rebuild its point and `Before`.  Collective; may raise CaseError.
 
-
-def read(context: AnalysisContext, number: int) -> tuple[checkpoints.Arrays, path_points.Point]:
-    """Read event `number` and rebuild its point; solve for missing multipliers.  Collective; may raise CaseError."""
+    If an event lacks multipliers, and `solves` is true, the equilibrium of the point is solved again.
+    """
     event, cell = context.checkpoint.read(number), context.loads.interfaces
-    point, _ = restored(event, cell)
-    if "lam" not in event:
-        point = found_again(point, cell)
-    return event, point
+    point, before = restored(event, cell)
+    if solves and "lam" not in event:
+        loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
+        load = Load(*map(np.concatenate, zip(*loads, strict=True)))
+        state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
+        point = replace(point, state=state, after=replace(point.after, lam=state.multipliers))
+    return event, point, before
 
 
 def resumable(context: AnalysisContext) -> int:
@@ -234,7 +233,7 @@ def holding(context: AnalysisContext, count: int) -> int:
             break
         first -= 1
     for number in range(max(min(first, count - 1), 0), count):  # the last event, if any, in any case
-        event, point = read(context, number)
+        event, point, _ = read(context, number)
         responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
         for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
             if any(not error <= context.checks.tolerance(name) for name, error in response.checks.items()):

@@ -30,7 +30,7 @@ def test_the_last_event_and_those_after_the_last_that_holds_in_all_problems_are_
     ]
     checked = []
     points = {number: SimpleNamespace(state=event, scale=1.0) for number, event in enumerate(events)}
-    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], points[number]))
+    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], points[number], None))
     monkeypatch.setattr(path_events, "averages", lambda *_: [])
     loads = SimpleNamespace(
         problems=[*columns],
@@ -47,7 +47,7 @@ def test_events_whose_means_are_wrong_do_not_hold(monkeypatch, wrong):
     events = [{"confirmed": False, "stress": np.array([1.0, 2.0 + 1e-3 * (number == wrong)])} for number in range(2)]
     point = SimpleNamespace(state=None, scale=1.0)
     response = SimpleNamespace(stress=np.array([1.0, 2.0]), checks={"strain": 1e-12})
-    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], point))
+    monkeypatch.setattr(path_events, "read", lambda context, number: (events[number], point, None))
     monkeypatch.setattr(path_events, "averages", lambda event, *_: [SimpleNamespace(stress=event["stress"])])
     loads = SimpleNamespace(
         problems=["plane"], interfaces=SimpleNamespace(completed=lambda state: state), responses=lambda *_: [response]
