@@ -114,5 +114,5 @@ def _fibre_lines(case: Case, summary: domain_partition.CellSummary) -> Iterator[
         mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
         yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
     if case.cell.match is not None:
-        distance = "mean diameters, the distance of the distributions of nearest and second neighbours"
-        yield f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {distance}"
+        text = "mean diameters, the distance of the distributions of nearest and second neighbours"
+        yield f"match      {case.cell.match.name}, to {domain_partition.match_distance(case, summary):.4f} {text}"

@@ -19,7 +19,7 @@ from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
 from feti_homog.analysis.result import Fields, Result
 from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
-from feti_homog.homogenization import partition_policy, uniform_parts, unit_cell
+from feti_homog.homogenization import domain_partition, partition_policy, uniform_parts, unit_cell
 from feti_homog.results import field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.system.parallel import mpi_errors
 from feti_homog.system.petsc import options_database
@@ -211,7 +211,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         nodes=cell.comm.allreduce(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
-        match_distance=cell.summary.match_distance,
+        match_distance=domain_partition.match_distance(cell.case, cell.summary),
         origin=cell.summary.origin,
     )
     return {

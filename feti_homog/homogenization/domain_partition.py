@@ -38,7 +38,6 @@ class CellSummary:
         origin: lower left corner of the cell in the user's coordinates; all other positions are relative to the corner.
         has_corners: whether straight edges between phases, or beside voids, meet at an angle.
         voids, moved_tips: number of voids; for each interface, the tips that the mesher moved.
-        match_distance: distance between the fibres and a matched table, see `random_fibres`; None without a table.
         remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.
         interface_nodes: number of interface nodes, which have no multipliers; None unless `across`.
@@ -61,7 +60,6 @@ class CellSummary:
     snapped: float
     origin: tuple[float, float]
     voids: int
-    match_distance: float | None
     remarks: tuple[str, ...]
     shift: Float
     has_corners: bool = False
@@ -167,7 +165,6 @@ def distribute(
         snapped=mesh.snapped,
         origin=mesh.origin,
         voids=torus.voids,
-        match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], radii),
         remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs, radii), *text),
         shift=mesh.shift,
         has_corners=mesh_fibres.has_corners(torus),
@@ -207,7 +204,6 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         snapped=0.0,
         origin=arrangement.origin,
         voids=arrangement.voids,
-        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
         remarks=(
             *arrangement.remarks,
             *cell_remarks.soft_springs(case, radii[is_fibre]),
@@ -236,13 +232,14 @@ def _cut_across(
     return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty
 
 
-def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """Return the error of neighbour distances of fibres (n,) against the matched table; None without a table."""
+def match_distance(case: Case, cell: CellSummary) -> float | None:
+    """Return the error of neighbour distances of the fibres against the matched table; None without a table."""
     if (window := case.cell.matched) is None:
         return None
     from feti_homog.microstructure import fibre_pattern, random_fibres  # imports the statistics of neighbours
 
-    pattern = fibre_pattern.FibrePattern(width, height, centres, radii, periodic=True)
+    centres, radii = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre]
+    pattern = fibre_pattern.FibrePattern(cell.width, cell.height, centres, radii, periodic=True)
     return random_fibres.match_distance(pattern, random_fibres.wanted_distances(window, pattern.count))
 
 
