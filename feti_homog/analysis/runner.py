@@ -16,7 +16,7 @@ from feti_homog import __version__
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import CONTACT_TOLERANCE, StateRecorder
-from feti_homog.analysis.result import Fields, Result
+from feti_homog.analysis.result import Result
 from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization import domain_partition, partition_policy, uniform_parts, unit_cell
@@ -68,9 +68,8 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     """
     progress = standard_streams.Progress(comm, quiet)
     with _torn(case, comm, progress) as cell:
-        states = StateRecorder(cell, None, keep_fields, progress.say)
-        context = AnalysisContext.of(cell, progress, states)
-        result = _result(context, _analyse(context), states.fields())
+        context = AnalysisContext.of(cell, progress, StateRecorder(cell, None, keep_fields, progress.say))
+        result = _result(context, _analyse(context))
     _print_summary(result, progress)
     return _without_faults(result)
 
@@ -133,7 +132,7 @@ def _run_and_write(
         seal = states.seal()
         if states.error is not None and not keep_fields:
             analysis.pop("states", None)
-    result = replace(_result(context, analysis, states.fields()), result_h5=seal)
+    result = replace(_result(context, analysis), result_h5=seal)
     if states.error is not None:  # the numbers are sound
         status = "incomplete" if result.status == "done" else result.status
         result = replace(result, faults=(*result.faults, str(states.error)), status=status)
@@ -232,12 +231,12 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
     }
 
 
-def _result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
+def _result(context: AnalysisContext, analysis: Mapping[str, Any]) -> Result:
     """Build the result from the `Result` entries of a finished analysis and from the context.  Collective."""
-    checks = context.checks
+    checks, states = context.checks, context.states
     entries = _opening(context) | {"checks": Checks(**checks.errors), "faults": tuple(checks.faults)}
     status = "not converged" if checks.faults else "done"
-    return Result(status=status, fields=fields, phase_stresses=context.states.phase_stresses(), **entries, **analysis)
+    return Result(status=status, fields=states.fields(), phase_stresses=states.phase_stresses(), **entries, **analysis)
 
 
 def _print_summary(result: Result, progress: standard_streams.Progress) -> None:
