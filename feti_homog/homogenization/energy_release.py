@@ -224,8 +224,7 @@ class TipZones:
         share = released / np.where(work.any(axis=1), work.sum(axis=1), 1.0)
         modes = np.zeros((len(tips.node), 3))
         modes[:, components if in_plane else [2]] = share[:, None] * work
-        fibre, pair, direction = self.fibre[tips.node], self.pair[tips.node], self.direction[tips.node]
-        return EnergyRelease(fibre=fibre, pair=pair, direction=direction, modes=modes, length=length)
+        return EnergyRelease(self.fibre[tips.node], self.pair[tips.node], self.direction[tips.node], modes, length)
 
     def _released(self, tips: debonded_arcs.CrackTips, response: Response, springs: Float) -> Float:
         """Return energy release rates G (t,), by a virtual crack extension at each tip.  Collective.
