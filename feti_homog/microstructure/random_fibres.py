@@ -195,14 +195,10 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
             break
         overlap = np.maximum(target[first] + target[second] - distance, 0.0)
         push = (overlap / np.maximum(distance, 1e-9))[:, None] * vector
-        step = 0.25 * (_sum_at(second, push, len(radii)) - _sum_at(first, push, len(radii))) + 0.9 * step
+        forces = [np.bincount(second, x, len(radii)) - np.bincount(first, x, len(radii)) for x in push.T]
+        step = 0.25 * np.stack(forces, axis=1) + 0.9 * step
         centres = (centres + step) % periods
     return centres, clearance
-
-
-def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Add up the vectors (k, 2) with equal `rows` (k,) to sums (count, 2), in a fixed order of terms."""
-    return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def placed(
