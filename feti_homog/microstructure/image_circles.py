@@ -53,7 +53,6 @@ def _fitted(edges: Float, inward: Float, size: tuple[int, ...]) -> tuple[float, 
         peaks.append(np.column_stack([centre, np.full(len(row), radius), votes[row, column]]))
         radius *= 1.1
     circles, counts = np.split(np.concatenate(peaks), [3], axis=1)
-    part = 0.0
     excess = _excess(circles, counts[:, 0], size, 0.15)
     circles, excess = circles[excess > 0.3], excess[excess > 0.3]
     for reach, least in FITS:
