@@ -53,10 +53,11 @@ class PatchNeighbours:
         is_start = at_boundary[at]
         return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
-    def shared(self, sums: Float, order: int) -> Float:
-        """Compute the neighbours' weighted parts (vertices, p, k) of right-hand sides `sums` (vertices, p, k)."""
-        moved = _translations(self.vector, order) @ sums[self.other]
-        return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
+    def shared(self, moments: Float, sums: Float, order: int) -> tuple[Float, Float]:
+        """Weight the neighbours' parts of `moments` (vertices, p, p) and `sums` (vertices, p, k) for a fit."""
+        T, weight = _translations(self.vector, order), NEIGHBOURS[order]
+        of_moments = gathered(self.at, T @ moments[self.other] @ T.transpose(0, 2, 1), len(moments))
+        return weight * of_moments, weight * gathered(self.at, T @ sums[self.other], len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
         """Compute the neighbours' weighted parts (6, vertices) of `moments`, the sums of 1, x, y, x^2, x y and y^2."""
@@ -65,12 +66,6 @@ class PatchNeighbours:
         moved_x, moved_y = x + a * one, y + b * one
         moved = one, moved_x, moved_y, xx + a * (x + moved_x), xy + a * y + b * moved_x, yy + b * (y + moved_y)
         return NEIGHBOURS[1] * np.array([np.bincount(self.at, row, moments.shape[1]) for row in moved])
-
-    def shared_matrices(self, moments: Float, order: int) -> Float:
-        """Compute the neighbours' weighted parts (vertices, p, p) of fit matrices `moments` (vertices, p, p)."""
-        T = _translations(self.vector, order)
-        moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
-        return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:

@@ -158,9 +158,9 @@ class RecoveredStress:
                 at = self.numbers[self.known.node]
                 values = self.known.imposed(tensors, at, self.problem.voigt, self.flexibility).reshape(values.shape)
             return values[:, None]
-        moments, sums = self.patch_sums()
-        moments = moments + neighbours.shared_matrices(moments, self.order)
-        return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
+        patches = self.patch_sums()
+        pairs = zip(patches, neighbours.shared(*patches, self.order), strict=True)
+        return self._with_shared(fitted(*(own + added for own, added in pairs)))
 
     def patch_sums(self) -> tuple[Float, Float]:
         """Sum w P^T P (vertices, p, p) and w P^T sigma (vertices, p, m k): weights w, `polynomials` P at a vertex."""

@@ -141,10 +141,7 @@ def fits_across_cuts(
     flags = shared.sum([np.isin(strip.shared, strip.bounds)[:, None].astype(float) for strip in strips])
     neighbours = [strip.neighbours(flag[:, 0] > 0) for strip, flag in zip(strips, flags, strict=True)]
     order = bodies[0].order if bodies else 1
-    additions = [
-        (pairs.shared_matrices(moments, order), pairs.shared(sums, order))
-        for pairs, (moments, sums) in zip(neighbours, patches, strict=True)
-    ]
+    additions = [pairs.shared(*patch, order) for pairs, patch in zip(neighbours, patches, strict=True)]
     fits = {}
     additions = _over_pieces(shared, strips, additions)
     for mesh, strip, pairs, patch, added in zip(shared.meshes, strips, neighbours, patches, additions, strict=True):
