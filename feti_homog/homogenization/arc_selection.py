@@ -93,34 +93,29 @@ class EstimatedNodes:
         is_vertex = (step == 0) | (step == lattice.intervals)
         return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
-    def moved_tips(self, case: Case, fibres: int) -> tuple[debonded_arcs.MovedTips, ...]:
-        """Return the tips that the mesher moved to vertices, by interface; a user's mesh has none: empty mappings."""
-        if case.cell.has_own_mesh:
-            return ({},) * len(case.interfaces)
-        distance, moved = float(np.degrees(outline.MERGED)), []
-        for pair, interface in enumerate(case.interfaces):
-            candidate = self.is_vertex & (self.pair == pair)
-            tips = debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
-            moved.append(debonded_arcs.moved_tips(tips, self.fibre[candidate], self.direction[candidate], distance))
-        return tuple(moved)
-
 
 def checked(
     case: Case, nodes: EstimatedNodes, centres: Float, faults: Sequence[str]
 ) -> tuple[tuple[debonded_arcs.MovedTips, ...], list[str]]:
-    """Return the moved tips by interface, and all faults: the given `faults`, then faults of arcs.
+    """Return the tips that the mesher moved, by interface, and all faults: the given `faults`, then faults of arcs.
 
-    Arcs on fibres that cannot have arcs are faults.  Without other faults, arcs and nonzero [angle] openings that
-    select no node are faults, too.  `centres` (fibres, 2) are NaN for fibres without a centre.
+    The mesher moves tips to vertices, but not in a user's mesh.  Arcs on fibres that cannot have arcs are faults.
+    Without other faults, arcs and nonzero [angle] openings that select no node are faults, too.  `centres` (fibres, 2)
+    are NaN for fibres without a centre.
     """
-    lines, moved = list(faults), nodes.moved_tips(case, len(centres))
+    lines, moved = list(faults), list[debonded_arcs.MovedTips]()
     for label, interface in interface_section.labelled(case.interfaces):
         lines += debonded_arcs.faults(interface.debonded, centres, label)
     if lines:
-        return moved, lines
+        return (), lines
     openings: Sequence[float | None] = case.section.openings or [None]
     for pair, (label, interface) in enumerate(interface_section.labelled(case.interfaces)):
-        fibres, directions = nodes.fibre[nodes.pair == pair], nodes.direction[nodes.pair == pair]
+        of_pair = nodes.pair == pair
+        fibres, directions = nodes.fibre[of_pair], nodes.direction[of_pair]
+        places = nodes.is_vertex[of_pair] & (not case.cell.has_own_mesh)
+        tips = debonded_arcs.tips(interface.debonded, case.section.openings, len(centres))
+        farthest = float(np.degrees(outline.MERGED))
+        moved.append(debonded_arcs.moved_tips(tips, fibres[places], directions[places], farthest))
         for (number, arc), opening in product(enumerate(interface.debonded), openings):
             angle = opening if arc.angle is None else arc.angle
             line = f"[{label}] debonded[{number}]"
@@ -137,4 +132,4 @@ def checked(
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
                 words = f"no node of {whose} is within the arc of {angle} degrees"
                 lines.append(f"{line}: {words}; make it wider, or the elements smaller")
-    return moved, list(dict.fromkeys(lines))
+    return tuple(moved), list(dict.fromkeys(lines))
