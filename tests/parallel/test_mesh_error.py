@@ -251,8 +251,7 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     u, loads = (np.stack([getattr(each, name) for each in responses], axis=1) for name in ("u", "strain"))
     k, nested = len(responses), cell.nested_lattice.within(cell.lattice)
     fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
-    largest = 0.0
-    operators = cell.solver.interface_operators
+    operators, largest = cell.solver.interface_operators, 0.0
     for members, mesh, coarse, _ in nested_interiors(operators, cell.lattice, cell.nested_lattice, u, loads):
         first = 0
         for s in members:
