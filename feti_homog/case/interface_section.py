@@ -173,8 +173,8 @@ class InterfaceSection:
     )
     teeth: int | None = key(
         types.integer(least=1, most=10_000),
-        "Number of damage steps, each of which is an event. Any number dissipates the energy of the law. "
-        "Replaces softening_tolerance.",
+        "Number of damage steps, each of which is an event. Any number absorbs the energy of the law, "
+        "but few lose more energy in jumps. Replaces softening_tolerance.",
         absent="as few as softening_tolerance allows",
         only=IF_SOFTENING,
     )

@@ -69,7 +69,7 @@ class FieldFile:
         self._rows = {symbol: _Rows(sum(n[: comm.rank]), n[comm.rank], sum(n)) for symbol, n in of_ranks.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
-        mpi_errors.on_root(comm, atomic.file_errors("write", self.path)(_create), self.part, size)
+        mpi_errors.on_root(comm, atomic.file_errors("write", self.path)(create), self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
         # MPI-IO has short name buffers: a descriptor of the folder shortens the name.
@@ -181,7 +181,7 @@ class FieldFile:
                 self.part.unlink()
 
 
-def _create(part: Path, size: int) -> None:
+def create(part: Path, size: int) -> None:
     """Create the HDF5 file `part` without content, and reserve `size` bytes for it.
 
     HDF5 may crash or hang if a write fails: plain system calls write here.  Raises OSError; then the file is removed.

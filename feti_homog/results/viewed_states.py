@@ -177,8 +177,12 @@ def _grid(state: ViewedState) -> ET.Element:
 
 def _write_vtkhdf(read: Any, file: Any, path: Path) -> None:
     """Write all states to a .vtkhdf file, on the mesh of the first.  `read(file, number)` returns a `ViewedState`."""
-    count = len(file.get("state", ()))
-    with h5py.File(path, "w") as out:
+    count, first = len(file.get("state", ())), read(file, 0)
+    mesh = [first.points, *[first.cells.astype(np.int64)] * 2]  # the second for offsets and types
+    of_state = [array for arrays in (first.means, first.nodes, first.elements) for array in arrays.values()]
+    size = sum(array.nbytes for array in mesh) + count * sum(array.nbytes for array in of_state)
+    field_file.create(path, size + len(of_state) * field_file.RESERVE)  # HDF5 crashes on a full disk
+    with h5py.File(path, "r+") as out:
         root = out.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])
         root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")

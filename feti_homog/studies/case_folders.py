@@ -162,7 +162,7 @@ def read_index(directory: Path) -> Sweep:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (AttributeError, ValueError, LookupError, TypeError) as error:
         reason = str(error).removeprefix("it is damaged: ")
-        raise CaseError(f"{path} is damaged: {reason}; move it away and start the sweep again") from error
+        raise CaseError(f"{path} is damaged: {reason}; restore it, or run the sweep in another folder") from error
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:

@@ -75,7 +75,8 @@ def run_all(
         fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
         if errors := [error for error in comm.allgather(fault) if error is not None]:
             remark = "finished cases are kept; the same command goes on with the others"
-            raise FetiHomogError(*dict.fromkeys(line for error in errors for line in error.faults), remark)
+            kind = CaseError if all(isinstance(error, CaseError) for error in errors) else FetiHomogError
+            raise kind(*dict.fromkeys(line for error in errors for line in error.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
@@ -204,6 +205,10 @@ class CaseRunner:
                 except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case only
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
+                    if isinstance(error, CaseError) and mpi_errors.on_root(
+                        self.comm, lambda: case_folders.case_state(self.directory, entry).document is not None
+                    ):
+                        raise  # a failure would let --retry discard the events, with which other ranks go on
                     mpi_errors.on_root_only(self.comm, case_folders.write_error, folder, error)
                     status = f"failed ({error.faults[0]})"
                 except FetiHomogError:  # a file could not be written: the next run computes the case again

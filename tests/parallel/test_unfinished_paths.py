@@ -9,6 +9,7 @@ from typing import Any
 from unittest import mock
 
 import pytest
+from mpi4py import MPI
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run, run_sweep
@@ -192,6 +193,29 @@ def test_a_result_that_has_all_points_is_no_unfinished_path(comm, shared_path):
     with interrupted(), pytest.raises(RuntimeError, match="interrupted"):
         run(Case.parse(CASE), comm, out=shared_path, resume=True)
     assert len(on_root(comm, output_folder.latest, shared_path)["path"]) == EVENTS
+
+
+def test_a_sweep_on_other_ranks_leaves_the_events_of_a_begun_case(comm, shared_path):
+    """One line, no failure that --retry would compute again; on as many ranks as before, the path goes on."""
+    if comm.size == 1:
+        pytest.skip("one rank is alone")
+    document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
+    out = shared_path / "out"
+    with interrupted(of="case-0002"), pytest.raises(RuntimeError, match="interrupted"):
+        run_sweep(document, out, comm)
+    comm.barrier()
+
+    def refused() -> None:
+        for retry in (False, True):
+            with pytest.raises(CaseError, match="events of a run on 2 ranks; go on with as many"):
+                run_sweep(document, out, MPI.COMM_SELF, retry=retry)
+            assert case_runs.list_cases(sweep_cases.expand(document, Path()), out)[1].startswith(
+                "case-0002  interrupted"
+            )
+
+    on_root(comm, refused)
+    run_sweep(document, out, comm)
+    assert on_root(comm, result_json.read, out / "case-0002")["resumed"] == EVENTS
 
 
 @pytest.mark.one_rank

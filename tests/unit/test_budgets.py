@@ -16,31 +16,31 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # Lines, of the modules beside the packages under "."; the second numbers: phase stresses, start of damage, figures,
 # begun runs, messages (of meshes, too), starts and steps of fits, soft springs, checks of checkpoints,
 # plain statements, friction without load, rates in space, breaks on later legs, ranks with different cases; the third:
-# conductivity, images, boundaries, ranges of numbers in results that verify compared before.
+# conductivity, images, boundaries, ranges of numbers in results that verify compared before, corners, curves of fits.
 LINES = {
-    ".": 470 + 18 - 2,
-    "analysis": 3000 + 140 + 75,
-    "case": 2880 + 36 + 119,
-    "commands": 560 + 10 + 31,
-    "fem": 1150 + 3 - 12,
-    "feti": 6300 + 8 + 60,
-    "homogenization": 3230 + 58 + 29,
-    "interface": 4000 + 24 - 24,
-    "materials": 1430 + 58 + 122,
-    "mesh": 5500 + 46 + 277,
-    "microstructure": 2140 + 24 + 78,
-    "report": 3420 + 217 + 109,
-    "results": 2430 + 227 + 35,
+    ".": 470 + 18 + 4,
+    "analysis": 3000 + 140 + 67,
+    "case": 2880 + 36 + 130,
+    "commands": 560 + 10 + 28,
+    "fem": 1150 + 3 - 24,
+    "feti": 6300 + 8 + 35,
+    "homogenization": 3230 + 58 + 1,
+    "interface": 4000 + 24 - 38,
+    "materials": 1430 + 58 + 99,
+    "mesh": 5500 + 46 + 293,
+    "microstructure": 2140 + 24 + 62,
+    "report": 3420 + 217 + 129,
+    "results": 2430 + 227 + 30,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 2,
+    "studies": 2950 + 129 + 46,
     "system": 1770 + 26 + 0,
-    "verify": 3100 + 162 + 75,
+    "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1132
+FILES, TOTAL = 310, 45000 + 800 + 1097
 # Percent of all lines: private functions that are called once, and imports.
-CALLED_ONCE, IMPORTS = 6.4, 6.0
+CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
-CONSTANTS, SHARED = 341, 217
+CONSTANTS, SHARED = 343, 217
 # Of 1 000 words of docstrings: "those", "what", "that of"; "of".  Percent of bound names that are pronouns or adverbs.
 VAGUE, OF, PRONOUNS = 1.0, 42.0, 1.0
 NO_NOUNS = {

@@ -1,5 +1,6 @@
 """Provide helpers for all pictures: style, triangles and lines, colour ranges, labels."""
 
+import io
 import math
 import warnings
 from collections.abc import Iterator, Sequence
@@ -99,8 +100,9 @@ def save(figure: Figure, path: Path, look: Look = PLAIN) -> Path:
     # Level 4 compresses in a third of the time of the default, 6, to files that are 3 % larger.
     more = {"pil_kwargs": {"compress_level": 4}} if look.format == "png" else {}
     how: dict[str, Any] = {"format": look.format, "dpi": DPI, "bbox_inches": None if look.size else "tight"} | more
-    with missing_letters_as_boxes():
-        return atomic.replace(path.with_suffix(f".{look.format}"), lambda part: figure.savefig(part, **how))
+    with missing_letters_as_boxes(), io.BytesIO() as content:  # Matplotlib would raise other errors on a full disk
+        figure.savefig(content, **how)
+        return atomic.replace(path.with_suffix(f".{look.format}"), lambda part: part.write_bytes(content.getvalue()))
 
 
 @contextmanager
@@ -179,8 +181,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
         norm, extend = Normalize(bottom, top), _outside(values, bottom, top)
     # A range far from zero still begins with a light colour.
     first, last = min(0.5 + 0.5 * bottom / largest, 0.55), max(0.5 + 0.5 * top / largest, 0.45)
-    shades = mpl.colormaps["RdBu_r"](np.linspace(first, last, 256))
-    colours: Any = ListedColormap(shades)
+    colours: Any = ListedColormap(mpl.colormaps["RdBu_r"](np.linspace(first, last, 256)))
     colours.colorbar_extend = extend
     return norm, colours, extend
 
@@ -225,8 +226,7 @@ def magnification(displacement: float, size: float, opening: float = 0.0, larges
         return 1.0
     ideal = 0.1 * size / displacement
     if opening > 0.0:
-        top = 0.25 * size / displacement
-        ideal = max(ideal, min(0.04 * size / opening, top))
+        ideal = max(ideal, min(0.04 * size / opening, 0.25 * size / displacement))
     power = 10.0 ** math.floor(math.log10(min(ideal, largest)))
     rounded = [factor * power for factor in (1, 2, 5, 10) if factor * power <= largest]
     return min(rounded, key=lambda scale: abs(math.log(scale / ideal)))

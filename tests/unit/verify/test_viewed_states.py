@@ -1,5 +1,7 @@
 """Fields that follow from those of result.h5: by the independent elements and laws of `verify`, and in files of VTK."""
 
+import errno
+import os
 import shutil
 from xml.etree import ElementTree
 
@@ -12,8 +14,9 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from feti_homog import Case, read_state
 from feti_homog.cli import main
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.laws import out_of_plane
+from feti_homog.results import viewed_states
 from feti_homog.verify.constitutive_law import VOIGT
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.reading import opened
@@ -100,6 +103,17 @@ def test_meshio_reads_every_state(folder):
         assert set(own) == set(read)
         for name, array in own.items():
             np.testing.assert_array_equal(read[name], array)
+
+
+def test_a_full_disk_is_one_error_before_hdf5_writes(folder, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = sorted(path.name for path in folder.iterdir())
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(FetiHomogError, match=r"cannot write .*cell\.vtkhdf: No space left on device"):
+        viewed_states.write_vtk(folder, "vtkhdf")
+    assert sorted(path.name for path in folder.iterdir()) == before
 
 
 def test_vtk_reads_the_states_as_steps(folder):
