@@ -51,8 +51,7 @@ def run(
         TypeError: `case` is not a Case, or `comm` is not an intracommunicator.
         CaseError, MeshError: the case cannot be run, ranks of `comm` have different cases or arguments, PETSC_OPTIONS
             is faulty, or `out` cannot be used.
-        ConvergenceError: a solve did not converge or a check failed; `result` of the error, and
-            `out`, hold the computed part.
+        ConvergenceError: a solve did not converge or a check failed; its `result`, and `out`, hold the computed part.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
         FetiHomogError: a file cannot be written, MPI has ended, or another thread is in a call of this module.
     """

@@ -59,7 +59,7 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge, a check failed, or nothing carries the load; a written result says `not converged`.
+    """A solve did not converge, a check failed, or nothing carries the load; the result has the status `not converged`.
 
     Attributes:
         result: the computed part as a `Result`, if `feti_homog.run` raised the error after an analysis; else None.

@@ -207,7 +207,7 @@ class Sensitivities:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseStresses:
-    """The largest stresses of one phase at the integration points, for s states."""
+    """The largest stresses of one phase, over its integration points, in each of s states."""
 
     phase: str = described("name of the phase")
     state: tuple[str, ...] = described("labels of the states, as in result.h5: `E11`, `load`, `event 12`, ...")

@@ -210,7 +210,7 @@ def _opening(context: AnalysisContext) -> dict[str, Any]:
         nodes=cell.comm.allreduce(sum(map(uniform_parts.nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
-        match_distance=domain_partition.match_distance(cell.case, cell.summary),
+        match_distance=mpi_errors.on_root(cell.comm, domain_partition.match_distance, cell.case, cell.summary),
         origin=cell.summary.origin,
     )
     return {

@@ -175,7 +175,7 @@ def nested_interiors(
 
 
 def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
-    """Yield groups of indices: consecutive subdomains of one phase, at most ELEMENTS_AT_ONCE elements unless alone."""
+    """Group the indices of consecutive subdomains of one phase; several have at most ELEMENTS_AT_ONCE elements."""
     group, elements = list[int](), 0
     for number, s in enumerate(subdomains):
         count = len(s.mesh.nodes) * len(lattice.triangles)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TornCell:
-    """A torn cell: its subdomains on all ranks, and the dual solver of one problem.
+    """A torn cell with its subdomains on all ranks and the dual solver of one problem.
 
     `summary` and `table` describe the whole cell and all subdomains; `lattice` refines the `subdomains` of each rank.
     In generalized plane strain, `axial` is the cell with displacements along the fibres, on the same meshes and nodes.

@@ -241,7 +241,7 @@ def seal(path: Path, block: int = BLOCK) -> FileSeal:
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
-    """Compare the size and checksum of a file with an `expected` seal of the same `block`.  Call on one rank.
+    """Compare a file with the `expected` size and checksum, from blocks of `block` bytes.  Call on one rank.
 
     Raises CaseError if size or checksum differ, FetiHomogError if the file cannot be read.
     """

@@ -235,10 +235,15 @@ def set_aside(folder: Path, status: Status) -> None:
         output_folder.remove_other_results(folder, ())
 
 
-def write_error(folder: Path, error: FetiHomogError) -> None:
-    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if that fails."""
+def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
+    """Write the lines of `error` to error.txt of a failed case.  On one rank.  Raises FetiHomogError if that fails.
+
+    Raises `error` itself if it refuses to continue a begun path: --retry would discard the events of a failed case.
+    """
+    if isinstance(error, CaseError) and case_state(directory, entry).document is not None:
+        raise error
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
-    atomic.replace_text(folder / ERROR_FILE, "\n".join(lines) + "\n")
+    atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:

@@ -205,11 +205,7 @@ class CaseRunner:
                 except (CaseError, MeshError, ConvergenceError) as error:  # a failure of this case only
                     if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                         raise
-                    if isinstance(error, CaseError) and mpi_errors.on_root(
-                        self.comm, lambda: case_folders.case_state(self.directory, entry).document is not None
-                    ):
-                        raise  # a failure would let --retry discard the events, with which other ranks go on
-                    mpi_errors.on_root_only(self.comm, case_folders.write_error, folder, error)
+                    mpi_errors.on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
                     status = f"failed ({error.faults[0]})"
                 except FetiHomogError:  # a file could not be written: the next run computes the case again
                     if mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):

@@ -20,7 +20,7 @@ CURVE_POINTS = 401  # strains at which curves are averaged
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics over finished realisations, in arrays of one shape.
+    """Statistics of an output over the finished realisations; all arrays have the same shape.
 
     `std` and `ci95`, half the 95 % confidence interval of the mean by Student's t, are NaN below two realisations.
     """

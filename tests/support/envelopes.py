@@ -28,7 +28,7 @@ ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion":
 
 
 def case_of(plane: str, interface: dict[str, Any], folder: Path = Path(), **sections: dict[str, Any]) -> Any:
-    """Return a case of a small cell with these bonds; `sections` replace those here."""
+    """Return a case of a small cell with the interface; `sections` replace its other sections."""
     base = {
         "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2},
         "output": {"fields": False, "pictures": False},

@@ -65,7 +65,7 @@ RELATED = {
 
 @pytest.mark.parametrize("expected", FAULTY)
 def test_faults_are_reported_by_section_and_key(tmp_path, expected):
-    """One fault is one line; a fault beside those in `expected` is counted in RELATED."""
+    """Each fault is one line; RELATED has the count where a key causes more faults than `expected`."""
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, FAULTY[expected])
     faults, lines = caught.value.faults, expected.splitlines()

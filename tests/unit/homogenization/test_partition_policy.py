@@ -119,7 +119,7 @@ def test_bytes_in_words():
     [(120, 176, 173e6), (872, 200, 334e6), (1676, 224, 454e6), (2172, 237, 670e6), (4110, 290, 685e6)],
 )
 def test_memory_of_paths_to_the_end(multipliers, few, measured):
-    """Within a third of what five paths took; `few` is the estimate for few events in MiB."""
+    """The estimate is within a third of the memory of five paths; `few` is the memory (MiB) after few events."""
     found = partition_policy.memory_to_the_end(make_case(), few * 2**20, multipliers, multipliers, 1)
     assert 0.75 < found / measured < 4 / 3
 

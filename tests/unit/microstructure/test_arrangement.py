@@ -1,4 +1,4 @@
-"""Arrangements of fibres of one or several phases against brute force over all pairs and images."""
+"""Arrange fibres of one or several phases; compare gaps with brute force over all pairs and images."""
 
 from itertools import product
 

@@ -1,4 +1,4 @@
-"""Cells of tables: the same for any origin, unit and order, and faulty tables."""
+"""Cells of tables do not depend on origin, unit or order of rows; faulty tables are refused."""
 
 from dataclasses import replace
 

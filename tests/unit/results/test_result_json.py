@@ -1,4 +1,4 @@
-"""result.json: what is written is read as it was, or not at all; large files are known by size and checksum."""
+"""Read result.json exactly as it was written, or refuse it; recognize large files by size and checksum."""
 
 import json
 import os

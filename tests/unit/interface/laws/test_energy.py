@@ -67,7 +67,7 @@ AROUND, ALONG = np.array([[0.3, 0.7, 0.0]]), np.array([[0.3, 0.0, 0.7]])
 
 
 def shares(law, **more):
-    """Return what shears around and along a fibre use of its bonds."""
+    """Return the utilisation of a bond under the shear AROUND a fibre, and under the shear ALONG the fibre."""
     found = law_of_sections([InterfaceSection(criterion=law, **NUMBERS | more)], np.zeros(1, np.int64))
     return found.share(AROUND)[0], found.share(ALONG)[0]
 
@@ -80,7 +80,7 @@ def test_shear_along_the_fibres_uses_what_it_uses_around_them(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_numbers_along_the_fibres_are_their_own_where_they_are_given(law):
-    """A strength, or with the root of it the stiffness, four times as large is that of a shear a fourth, or half."""
+    """Four times the axial strength acts as a fourth of the shear; four times the stiffness, as half of the shear."""
     has_strength = "axial_strength" in LAWS[law].keys
     key, size = ("axial_strength", 6.0) if has_strength else ("axial_stiffness", 200.0)
     around, along = shares(law, **{key: size})

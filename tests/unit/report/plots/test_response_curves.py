@@ -1,4 +1,4 @@
-"""Pictures of envelopes, sensitivities, stiffnesses over an angle and a conduction: what is drawn, and what is not."""
+"""Draw envelopes, sensitivities, stiffnesses over the debonding angle, and temperatures."""
 
 from itertools import pairwise
 from typing import Any
@@ -79,7 +79,7 @@ def test_labels_of_small_loads_do_not_overlap():
 
 
 def test_heat_map_has_the_elasticities() -> None:
-    """C11 = 3 p^2 q^0, of which the elasticities are 2 and 0; nothing follows of a constant that is zero."""
+    """C11 = 3 p^2 q^0 has the elasticities 2 and 0; a constant that is zero has none."""
     found = {
         "parameters": ["material.matrix.young", "material.$.poisson"], "parameter_values": [2.0, 0.3],
         "constants": ["C11", "C12"], "constant_values": [12.0, 0.0], "derivatives": [[12.0, 0.0], [1.0, 0.0]],
