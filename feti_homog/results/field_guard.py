@@ -29,7 +29,7 @@ def require_own(path: Path, state: int | None = None) -> None:
     """Check result.h5 in a child process, because HDF5 may crash on damaged files.
 
     It refuses soft and external links, which may lead to pipes, other files, or in circles; tables larger than the file
-    or outside it; other layouts; a damaged mesh or case; numbers outside RANGES, in all states or in one `state`.
+    or outside it; other layouts; a damaged mesh or case; numbers outside RANGES.  With `state`, it skips other states.
     Raises CaseError for these faults, a missing file or a failed child, FetiHomogError without read permission.
     """
     if not path.is_file():
@@ -47,6 +47,8 @@ def require_tables(path: Path, state: int | None) -> None:
             groups = [file["/"]]
             for group in groups:  # to which the loop adds the groups inside
                 for name in group:
+                    if state is not None and group.name.endswith("/state") and name != str(state):
+                        continue
                     entry: Any = group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
                     if isinstance(entry, h5py.Group) and 1024 * len(groups) < room["views"]:
                         groups.append(entry)
@@ -60,7 +62,7 @@ def require_tables(path: Path, state: int | None) -> None:
                         raise CaseError(f"{path}: no result: {group.name}/{name} is not a table of numbers in it")
             _require_layout(path, file, state)
             _require_mesh(path, file)
-            for group, view in field_layout.views_of(file):
+            for group, view in field_layout.views_of(file, state):
                 entry, original = file[view.path(group)], file[f"{group}/{view.source}"]
                 shape = (len(original), view.components) if view.components else (len(original),)
                 entry[:1]  # reading finds the sources
@@ -75,14 +77,13 @@ def _require_layout(path: Path, file: Any, state: int | None) -> None:
     counted = {"n": "mesh/points", "m": "mesh/triangles", "k": "interface/points", "f": "fibre/number"}
     entries = {"p": file.attrs.get_id("phases"), **{symbol: file[table] for symbol, table in counted.items()}}
     counts = {symbol: entry.shape[0] if entry.shape else 0 for symbol, entry in entries.items()}
-    states = [f"state/{number}" for number in range(len(file.get("state", ())))]
+    states = [f"state/{number}" for number in range(len(file.get("state", ()))) if state in (None, number)]
     is_spatial = any("axial_stress" in file[name] for name in states)
     parts: dict[str, Any] = {"": field_layout.Header, "mesh": field_layout.MeshPart, "fibre": field_layout.FibrePart}
     of_state = field_layout.SpatialStatePart if is_spatial else field_layout.StatePart
     parts |= {"interface": field_layout.InterfacePart, **dict.fromkeys(states, of_state)}
     for group, part in parts.items():
         hints, attributes = get_type_hints(part), file[f"/{group}"].attrs
-        is_read = state is None or group == f"state/{state}" or not group.startswith("state/")
         for name, description in records.descriptions(part).items():
             is_table, key = bool(field_layout.rows_of(description)), description.name or name
             entry = file[f"{group}/{name}"] if is_table else attributes.get_id(key)
@@ -93,7 +94,7 @@ def _require_layout(path: Path, file: Any, state: int | None) -> None:
             place = f"cannot read {path}: {f'/{group}'.rstrip('/')}/{name}"
             if actual not in (expected, *(expected.replace("3 or 6", columns) for columns in "36")):
                 raise CaseError(f"{place} is {actual}, expected {expected}")
-            if is_read and not is_text:
+            if not is_text:
                 _require_values(place, name, counts, entry if is_table else attributes[key])
 
 

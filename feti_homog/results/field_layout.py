@@ -251,10 +251,10 @@ SPATIAL_VIEWS: tuple[View, ...] = (
 )
 
 
-def views_of(file: Any) -> list[tuple[str, View]]:
-    """Return pairs of group and view for all views of an open file whose tables exist and have rows."""
+def views_of(file: Any, state: int | None = None) -> list[tuple[str, View]]:
+    """Return pairs of group and view for the views of one or all states whose tables exist and have rows."""
     groups = {"interface": VIEWS["interface"]}
-    for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
+    for group in (f"state/{number}" for number in sorted(map(int, file.get("state", ()))) if state in (None, number)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
     return [
         (group, view)
