@@ -189,7 +189,7 @@ class Case:
         document.get("path", {}).pop("max_events", None)
         document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
         content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
-        return short_digest(json.dumps(document, sort_keys=True).encode() + content)
+        return short_digest(json.dumps(document, sort_keys=True).encode() + content.replace(b"\r\n", b"\n"))
 
 
 load = Case.load

@@ -126,7 +126,8 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
                 break
         if stored != sweep.entries[: len(stored)]:
             raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
-        if not stored:
+        statuses = {stored_state(directory, entry).status for entry in sweep.entries}
+        if not stored and (Status.DAMAGED in statuses or Status.DONE not in statuses):  # else it lost its list
             refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
         atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
         if stored != sweep.entries:
@@ -162,7 +163,7 @@ def read_index(directory: Path) -> Sweep:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (AttributeError, ValueError, LookupError, TypeError) as error:
         reason = str(error).removeprefix("it is damaged: ")
-        raise CaseError(f"{path} is damaged: {reason}; restore it, or run the sweep in another folder") from error
+        raise CaseError(f"{path} is damaged: {reason}; remove it and run the sweep again: results stay") from error
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:

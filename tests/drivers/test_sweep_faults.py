@@ -49,7 +49,12 @@ def test_a_damaged_list_of_cases_is_reported(tmp_path):
     for words in (["sweep", path, "--out", out], ["collect", out]):
         job = in_process(*words)
         assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
-    assert len(results(out)) == 2
+    before = results(out)
+    (out / "sweep.json").unlink()
+    job = in_process("sweep", sweep_file(tmp_path, TWO.replace("0.2", "0.21")), "--out", out)
+    assert job.returncode == 2 and "would replace it" in job.stderr
+    assert "2 of 2 cases done" in swept(out, sweep_file(tmp_path, TWO)).stdout
+    assert len(before) == 2 and results(out) == before
 
 
 @pytest.mark.parametrize(
