@@ -13,7 +13,7 @@ TABLE = "x,y,radius\n1,1,0.5\n"
 
 
 def case_of(tmp_path, keys, table=TABLE):
-    (tmp_path / "t.csv").write_text(table)
+    (tmp_path / "t.csv").write_bytes(table.encode())
     path = tmp_path / "case.toml"
     path.write_text(BASE.replace(MESH_CELL[0], f'geometry = "table"\nfile = "t.csv"\n{keys}'))
     return load(path)
@@ -58,7 +58,8 @@ def test_long_elements_by_default_name_the_way_to_choose_them(keys, elements, tm
 
 def test_the_digest_is_that_of_the_table(tmp_path):
     keys = "width = 4\nheight = 3"
-    digests = [case_of(tmp_path, keys, table).digest() for table in (TABLE, TABLE, TABLE.replace("0.5", "0.6"))]
+    tables = (TABLE, TABLE.replace("\n", "\r\n"), TABLE.replace("0.5", "0.6"))
+    digests = [case_of(tmp_path, keys, table).digest() for table in tables]
     assert digests[0] == digests[1] != digests[2]
     assert case_of(tmp_path, keys + '\nwindow = "cut"').digest() != digests[0]
 
