@@ -236,7 +236,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
         if count > MOST_PAIRS:
             raise MeshError(
                 f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
-                f"{MOST_PAIRS}: they lie on top of each other, or one of them or mesh_size is much larger than the others"
+                f"{MOST_PAIRS}: they overlap, or one of them or mesh_size is much larger than the others"
             )
     # Balancing does not pay for a single query.
     tree = cKDTree(place, balanced_tree=False, compact_nodes=False)

@@ -160,7 +160,7 @@ def test_a_file_of_another_format_is_refused(tmp_path):
 
 @pytest.mark.parametrize("bit", range(8))
 def test_any_flipped_bit_is_refused(tmp_path, bit):
-    """Also one of a length, by which the last event would be an unfinished one; the message tells how to keep others."""
+    """Even of a length, by which the last would be an unfinished one; the message says how to keep the others."""
     checkpoint, chance = written(tmp_path), random.Random(bit)
     content, ends = checkpoint.path.read_bytes(), ends_of(checkpoint)
     places = [*chance.sample(range(len(content)), 24), *(end + k for end in ends[:-1] for k in range(PREFIX.size))]
