@@ -76,7 +76,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     points = document["path"] if breaking is None else document["path"][: np.count_nonzero(leg <= breaking)]
     start, stop = 0, len(leg)  # all points, or the points of the leg where damage begins
     if (damaging := path_curves.damaging_leg(document, ("broke", "softened"))) is not None:
-        start, stop = np.count_nonzero(leg < damaging), np.count_nonzero(leg <= damaging)
+        start, stop = int((leg < damaging).sum()), int((leg <= damaging).sum())
     component = path_curves.leading_component(document)
     # The sum with 0.0 turns -0.0 into 0.0.
     strain = np.array([point["strain"][component] for point in points], float) + 0.0

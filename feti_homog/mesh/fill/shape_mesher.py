@@ -155,7 +155,7 @@ def _size_field(arrangement: Arrangement, sizes: MeshSizes) -> SizeField:
     size, shapes = arrangement.size, arrangement.outer
     assert isinstance(shapes, convex_sums.ConvexSums)
     places, normal, shape = shapes.boundary(convex_sums.POINTS)
-    rounds, is_round = np.full(len(places), np.inf), shapes.frames.any(axis=(1, 2))[shape]
+    rounds, is_round = np.full(len(places), np.inf), np.asarray(shapes.frames.any(axis=(1, 2)))[shape]
     rounds[is_round] = Ellipses(shapes.centres, shapes.frames)[shape[is_round]].bend(normal[is_round])
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
     # The distance to the nearest point on another shape, or on an image.

@@ -67,7 +67,7 @@ def figure(cell: drawn_cell.DrawnCell, document: Document, look: plot_helpers.Lo
             axes.label_outer()
     for column in grid.T:
         column[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
-        _limit(column)
+        _limit(list(column))
     if np.abs(last_state["jump"][:]).max() < SAME_PLACE**2 * file.attrs["width"]:
         grid[0][1].set_ylim(-1.0, 1.0)  # jumps of bonded faces are rounding
     shaded = status[np.isin(fibre, chosen)]
