@@ -26,7 +26,7 @@ ATTRIBUTES = {
         (np.zeros(3), r"/case is float64 \(3,\), expected text \(\)"),
         ("[]", "no table of keys"),
         ("{}", r"the case in it is damaged: \[cell\]: missing"),
-        ("[" * 2000, "nested too deeply"),
+        ("[" * 60_000, "nested too deeply"),
     ),
     ("/", "title"): ((np.bytes_(b"x"), r"/title is \|S1 \(\), expected text \(\)"),),
     ("/", "phases"): (("matrix", r"/phases is text \(\), expected text \("),),
