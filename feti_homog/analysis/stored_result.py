@@ -92,9 +92,8 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
             lines.append(f"{wording.dotted_key(path)}: {old} now {new}")
     if n_before != ranks and len(lines) == 1:
         raise CaseError(f"--resume: {start} of a run on {n_before} ranks; go on with as many, or choose another folder")
-    files = [f"the content of {path}" for path in (case.cell.file, case.cell.match) if path is not None]
-    where = f", which differs in {', '.join(lines or files)}" if lines or files else ""
-    raise CaseError(f"--resume: {start} of another case{where}; choose another folder")
+    where = ", ".join(lines) or f"the content of {case.cell.file or case.cell.match or 'result.json'}"
+    raise CaseError(f"--resume: {start} of another case, which differs in {where}; choose another folder")
 
 
 def _numbered(value: Any) -> Any:

@@ -202,8 +202,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                     return
                 content = stream.read(size) if is_sound else b""
                 if not is_sound or zlib.crc32(content) != checksum:
-                    fault = f"{path} is damaged: the checksum of record {number} is wrong"
-                    raise CaseError(f"{fault}; `truncate -s {place} {path}` keeps the records before it")
+                    raise CaseError(f"{path} is damaged; `truncate -s {place} {path}` keeps {number} records")
                 place += PREFIX.size + size
                 yield place, content
     except OSError as error:

@@ -33,8 +33,7 @@ def require_own(path: Path, state: int | None = None) -> None:
     Raises CaseError for these faults, a missing file or a failed child, FetiHomogError without read permission.
     """
     if not path.is_file():
-        has_events = (path.parent / "checkpoint/events").is_file()
-        stored = " and --resume: the checkpoint has its events" if has_events else ""
+        stored = " and --resume: the checkpoint has its events" if (path.parent / "checkpoint/events").is_file() else ""
         raise CaseError(f"cannot read {path}: it is missing; run the case again with [output] fields = true{stored}")
     input_files.in_own_process(path, partial(require_tables, state=state), (1 << 30) + 4 * path.stat().st_size)
 

@@ -154,9 +154,8 @@ def read_index(directory: Path) -> Sweep:
         entries = tuple(SweepCase(**_replaced(entry, types.INF, math.inf)) for entry in document["cases"])
         texts = [document["name"], document["stress_unit"], *(entry.identity for entry in entries)]
         counts = [number for e in entries for number in (e.number, e.point, e.realisation)]
-        drawn = "cell.fibre_fraction"
         is_sound = all(type(n) is int and n > 0 for n in counts) and all(isinstance(text, str) for text in texts)
-        if not is_sound or not all(0.0 < e.inputs.get(drawn, 0.5) < 1.0 for e in entries):
+        if not is_sound or not all(0.0 < e.inputs.get("cell.fibre_fraction", 0.5) < 1.0 for e in entries):
             raise TypeError("a name, number or input of a case is missing or of another type")
         return Sweep(document["name"], document["stress_unit"], entries)
     except OSError as error:
