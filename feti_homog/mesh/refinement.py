@@ -197,8 +197,8 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
 
 def joined(meshes: Sequence[FineMesh]) -> FineMesh:
     """Concatenate refined meshes that have one lattice and no common nodes; shift node and class numbers."""
-    nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-    classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
+    nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)], dtype=np.int32)
+    classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)], dtype=np.int32)
     return FineMesh(
         np.concatenate([mesh.points for mesh in meshes]),
         np.concatenate([mesh.nodes + first for mesh, first in zip(meshes, nodes, strict=False)]),
