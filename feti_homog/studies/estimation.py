@@ -105,7 +105,7 @@ class ParameterEstimates:
 
         An unknown at a bound takes no degree of freedom from the residuals.
         """
-        freedom = len(self.residuals) - max(self.rank - int(np.sum(self.at_bound)), 0)
+        freedom = len(self.residuals) - max(self.rank - int(np.count_nonzero(self.at_bound)), 0)
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
     @property
