@@ -130,6 +130,6 @@ def checked(
                     lines.append(f"{line}.fibre: fibre {fibre} has no interface {kind}; the first with one: {first}")
                     continue
                 whose = "any fibre" if fibre is None else f"fibre {fibre}"
-                words = f"no node of {whose} is within the arc of {angle} degrees"
+                words = f"no node of {whose} is within the arc of {angle:g} degrees"
                 lines.append(f"{line}: {words}; make it wider, or the elements smaller")
     return tuple(moved), list(dict.fromkeys(lines))

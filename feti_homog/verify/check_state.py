@@ -146,7 +146,7 @@ def check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
             record("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0)
         if files.contact:
             record("penetration", np.where(bonded, 0.0, np.maximum(-gap, 0.0)), scales.displacement)
-            record("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull)
+            record("tension", np.where(closed & (normal > 0.0), force, 0.0), push)
             record("complementarity", np.where(bonded, 0.0, force * gap), push * scales.displacement)
     if rubs.any():
         rubbing, limit = rubbing_force(files, state), friction_at(files, on_damage=True) * pressure

@@ -127,9 +127,10 @@ def kkt_errors(
     """Measure the largest violations of the KKT conditions on debonded faces, absolute if no load acts.  Collective.
 
     `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
-    the normal traction of a closed node relative to the largest traction on the interface.  `kkt_complementarity`
-    measures force gap = 0: |force gap| relative to the largest force on the interface times the displacement.  Scales
-    of traction are at least the imposed stress, because without forces on the faces all tractions are rounding errors.
+    the normal force of a closed node relative to the largest traction on the interface times the longest tributary
+    length.  `kkt_complementarity` measures force gap = 0: |force gap| relative to the largest force on the interface
+    times the displacement.  Scales of traction are at least the imposed stress, because without forces on the faces all
+    tractions are rounding errors.
 
     Args:
         traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) gap.
@@ -145,7 +146,7 @@ def kkt_errors(
     displacement = scales.imposed(acting) or 1.0
     largest_traction, largest_force = (np.where(size > 0.0, size, 1.0) for size in (largest_traction, largest_force))
     penetration = np.where(debonded, -gap, 0.0).max(initial=0.0) / displacement
-    tension = np.where(debonded & closed, traction[:, 0] / largest_traction, 0.0).max(initial=0.0)
+    tension = np.where(debonded & closed, force / (largest_traction * scales.longest), 0.0).max(initial=0.0)
     work = np.where(debonded, np.abs(force * gap) / (largest_force * displacement), 0.0).max(initial=0.0)
     worst = np.array([penetration, tension, work])
     comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
