@@ -234,8 +234,7 @@ def test_faces_that_stick_beyond_their_friction(rubbing, share, seen):
     friction = np.where(rubbing.arc & (rubbing.comm.rank == rubbing.comm.size - 1), 0.05, 1e3)
     faces = SlidingCell(CoupledInterfaces(rubbing.interface), friction, 0.0 * friction)
     bonds = replace(torn_cells.bonds(rubbing.status(CLOSED)), sliding=np.zeros(len(friction), np.int8))
-    load = Load.strain(PRESSED)
-    status, start = faces.begin(bonds, PRESSED)
+    load, (status, start) = Load.strain(PRESSED), faces.begin(bonds, PRESSED)
     given = Prescribed(load.by_stress, faces.given(load), np.zeros(len(status)))
     x, _ = faces.faces.linear(0 * status, given, start)
     state = faces.equilibrium([load, Load.strain((share == 1.0) * PRESSED)], bonds, share * x)
@@ -244,7 +243,9 @@ def test_faces_that_stick_beyond_their_friction(rubbing, share, seen):
     reuss, voigt = rubbing.bounds()
     least = np.abs(share * PRESSED).max(), (reuss / voigt).min() * np.abs(PRESSED).max()
     largest = max(np.abs(traction).max(), rubbing.bond_stress(np.array(least)))
-    beyond, tension = (np.abs(shear) - mu * np.maximum(-normal, 0.0)).max() / largest, max(normal.max(), 0.0) / largest
+    lengths = rubbing.everywhere(rubbing.interface.nodes.length / rubbing.interface.scales.longest)
+    pull = np.maximum(normal * lengths[rubbing.everywhere(rubbing.arc)], 0.0)
+    beyond, tension = (np.abs(shear) - mu * np.maximum(-normal, 0.0)).max() / largest, pull.max() / largest
     for number, (law, expected) in enumerate([("kkt_friction", beyond), ("kkt_tension", tension)]):
         parallel_assert(rubbing.comm, state.certificate[law] == pytest.approx(expected, rel=1e-6, abs=1e-30), law)
         assert expected > (1e-2 if share == 1.0 else 1e-5) if number < seen else expected < 1e-14, law
