@@ -2,11 +2,14 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from support.command_line import case_file, command_line, in_process
 from support.hooks import Hook, hooked
+from support.jobs import PATIENCE, environment
 
 from feti_homog.system.petsc.option_table import OPTIONS
 
@@ -193,3 +196,16 @@ def test_options_that_petsc_alone_knows_pass(tmp_path):
     words = ["-feti_ksp_monitor_true_residual", "-feti_sub_pc_factor_mat_ordering_type", "nd", "-feti_ksp_type", "fcg"]
     job = command_line(1, "check", case_file(tmp_path, CUT), *words)
     assert (job.returncode, job.stderr) == (0, "")
+
+
+def test_solvers_that_python_keeps_to_its_end_do_not_outlive_petsc(tmp_path):
+    """Also if another module, here that of temporary folders, had finalizers before PETSc began."""
+    lines = (
+        "import tempfile; folder = tempfile.TemporaryDirectory()",
+        f"import feti_homog as f; f.run(f.Case.load({str(case_file(tmp_path, CUT))!r}), quiet=True)",
+        "from feti_homog.feti.linalg.sparse_direct import DirectSolver; from scipy.sparse import eye",
+        "kept = DirectSolver(eye(5).tocsr(), 'feti_sub_'); print('kept')",
+    )
+    words, options = [sys.executable, "-c", "\n".join(lines)], {"capture_output": True, "text": True}
+    job = subprocess.run(words, env=environment(), timeout=PATIENCE, check=False, **options)
+    assert (job.returncode, job.stdout, job.stderr) == (0, "kept\n", "")

@@ -1,10 +1,10 @@
 """Import the libraries that share one MPI and that pip does not install, and start PETSc."""
 
-import atexit
 import importlib
 import re
 import resource
 import sys
+import weakref
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -67,7 +67,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
             complain(f"error: PETSc cannot end (error code {code}); the results are complete")
             comm.Abort(ExitCode.DEFECT)
 
-    atexit.register(end)
+    weakref.finalize(PETSc, end)  # at exit, after later finalizers, which destroy solvers
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
         import numpy as np
         from scipy.linalg import blas
