@@ -127,10 +127,9 @@ def kkt_errors(
     """Measure the largest violations of the KKT conditions on debonded faces, absolute if no load acts.  Collective.
 
     `kkt_penetration` measures gap >= 0: -gap relative to the imposed displacement.  `kkt_tension` measures force <= 0:
-    the normal force of a closed node relative to the largest traction on the interface times the longest tributary
-    length.  `kkt_complementarity` measures force gap = 0: |force gap| relative to the largest force on the interface
-    times the displacement.  Scales of traction are at least the imposed stress, because without forces on the faces all
-    tractions are rounding errors.
+    the normal force of a closed node relative to the interface's largest traction times its longest tributary length.
+    `kkt_complementarity` measures force gap = 0: |force gap| relative to the interface's largest force times the
+    displacement.  Scales of traction are at least the imposed stress: without forces, tractions are rounding errors.
 
     Args:
         traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) gap.
