@@ -243,8 +243,8 @@ def boundary_tractions(
         selected = np.flatnonzero((ends_here == 2) | (void_ends > 0))
         if len(selected):
             areas, size, is_free = table[selected, :2], table[selected, 2], void_ends[selected] > 0
-            traction = forces[np.maximum(position[selected], 0)[:, None] + np.arange(stress.problem.components)]
-            traction[is_free] = 0.0
+            traction = np.zeros((len(selected), stress.problem.components, forces.shape[1]))
+            traction[~is_free] = forces[position[selected[~is_free], None] + np.arange(stress.problem.components)]
             length = of_node[position[selected]] if nested else np.hypot(*areas.T)
             traction /= np.where(is_free, 1.0, np.maximum(length, 1e-300))[:, None, None]
             by_group[number] = local_fits.KnownTractions.at(selected, areas / size[:, None], traction)

@@ -55,6 +55,15 @@ def test_square_cell_of_round_voids(comm, shared_path):
     assert [L[0, 0], L[0, 1], L[2, 2]] == pytest.approx((40.268438, 9.710096, 6.303568), rel=2e-4)
 
 
+def test_springs_that_have_no_interface_change_no_cell_of_voids(comm, shared_path):
+    write(comm, shared_path, geometry="square", fibre_fraction=0.2, mesh_size=0.1, voids=[0])
+    springs = {"normal_stiffness": 2.0, "tangential_stiffness": 1.0}
+    results = [run(porous(shared_path, **BARE, **more), comm, quiet=True) for more in ({}, {"interface": springs})]
+    L, errors = ([getattr(r, name) for r in results] for name in ("effective_stiffness", "mesh_error"))
+    assert relative_error(*L) < 1e-9 and errors[0] is not None
+    np.testing.assert_allclose(*(error.effective_stiffness for error in errors), rtol=1e-6)
+
+
 def test_a_debonded_fibre_without_contact_is_a_void(comm, shared_path):
     write(comm, shared_path)
     empty = run(porous(shared_path, {"order": 2}, **BARE), comm)
