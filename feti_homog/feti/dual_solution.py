@@ -66,7 +66,7 @@ class ActiveJumps:
         return np.asarray(np.sqrt(distributed_arrays.allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x))))
 
     def projected(self, x: Float) -> Float:
-        """Compute P x for jumps x (owned rows, k), restricted to the active rows.
+        """Compute P x for jumps or multipliers x (owned rows, k), restricted to the active rows.
 
         P is applied twice: rounding of a single product contains rigid-body motions, which stall a Krylov method.
         """
@@ -136,16 +136,18 @@ class ActiveJumps:
         residual = float(residual / (scale or 1.0))
         return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)
 
+    def balanced(self, solution: DualSolution) -> DualSolution:
+        """Return P lam for a solution, without alpha: influence columns leave up to 1e-8 of lam as forces on bodies."""
+        return replace(solution, lam=self.projected(solution.lam[:, None])[:, 0], alpha=None)
+
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
         """Return a solution of the present state, completed by alpha, jumps and residual from F lambda.
 
         `d` (owned rows, v) holds the jumps of the torn cell under the unit loads.
         """
-        torn = (d @ solution.strain)[:, None]
-        lam, iterations, reason = solution.lam[:, None], solution.iterations, solution.reason
-        jump = torn - self.operator.apply(lam)
-        scale = self.norms(self.projected(torn))
-        return self.solutions(solution.strain[None], lam, jump, iterations, reason, scale)[0]
+        torn, lam = (d @ solution.strain)[:, None], solution.lam[:, None]
+        jump, scale = torn - self.operator.apply(lam), self.norms(self.projected(torn))
+        return self.solutions(solution.strain[None], lam, jump, solution.iterations, solution.reason, scale)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:

@@ -119,9 +119,7 @@ class PrimalTest:
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
         """Return DIVERGED_BREAKDOWN if the norm has `stalled` and a stall ends the solve, else ITERATING."""
-        if stalled and self.ends_on_stall:
-            return REASON.DIVERGED_BREAKDOWN
-        return REASON.ITERATING
+        return REASON.DIVERGED_BREAKDOWN if stalled and self.ends_on_stall else REASON.ITERATING
 
 
 class Krylov:

@@ -186,9 +186,10 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
     longest = float(lengths(np.ones(len(nodes.length), bool)).max(initial=0.0)) or 1.0
     total, points_with_state = nodes.length.sum() or 1.0, {state.point for state in states}
     of_section = nodes.length[:, None] * (nodes.pair[:, None] == np.arange(sections))
-    sizes = [(cell.scales_of(state).stress, *np.abs(state.mean_stress)) for state in states]
-    stress = float(np.max(sizes, initial=0.0)) or 1.0
+    stress = float(np.max([(cell.scales_of(s).stress, *np.abs(s.mean_stress)) for s in states], initial=0.0)) or 1.0
     energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
+    laws = {"stored": "energy", "stored_in_springs": "energy"}
+    laws |= {"stress": "mean stress"} if "path" in files.document else {}  # fields have balanced multipliers
     for state, (_, entries) in pairs:
         debonded, damaged = state.status != Status.BONDED, (state.damage > 0.0) & (state.damage < 1.0)
         numbers: dict[str, tuple[Any, float]] = {
@@ -205,8 +206,7 @@ def check_tables(findings: Findings, cell: DiscreteCell, states: States, pairs: 
         }
         numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
         for name in [name for name in numbers if name in entries]:
-            law, (value, scale) = "energy" if name.startswith("stored") else "tables", numbers[name]
-            findings.compare(law, entries[name], value, scale, f"{state.name}, {name}")
+            findings.compare(laws.get(name, "tables"), entries[name], *numbers[name], f"{state.name}, {name}")
     for number, point in enumerate(files.points):
         count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
         findings.compare("tables", count, len(nodes.length), 1.0, place)

@@ -152,7 +152,7 @@ def checks(rtol: float, users_mesh: bool, phases: Sequence[float] = (0, 0, 0, 0)
         ("complementarity", "gap times traction vanishes, relative to the largest force and displacement", contact),
         ("free faces", "open faces carry no traction, closed faces no shear but friction, relative", contact),
         ("sliding", "friction opposes the slip of sliding faces, relative to the largest traction", contact),
-        ("mean stress", "elements have the mean stress of the state, relative to its largest component", balance),
+        ("mean stress", "elements and path points have the mean stress of the state, relative to the largest", balance),
         ("mean strain", "the mean strain of elements and openings of faces is E, relative to E", solver),
         ("Hill", "the mean of stress : strain is mean stress : E less the work of the interface, relative", work),
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),

@@ -153,14 +153,15 @@ class ContactProblem:
         return solve_load(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return the state with jumps and rigid-body amplitudes alpha, from its multipliers.  Collective.
+        """Return the state with jumps and rigid-body amplitudes alpha, from its balanced multipliers.  Collective.
 
         Free fibres then move as in `FloatingBodies.place`, with its exceptions.  A state with alpha is returned itself.
         """
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
-        return replace(state, solution=self._place_free_fibres(state.bonds, self.solver.completed(state.solution))[0])
+        complete = self.solver.completed(self.solver.jumps.balanced(state.solution))
+        return replace(state, solution=self._place_free_fibres(state.bonds, complete)[0])
 
     def is_linear(self, status: Status) -> bool:
         """Return whether contact states cannot change: no faces are debonded, or faces may overlap.  Collective."""
@@ -280,7 +281,7 @@ class ContactProblem:
             if self._any(idle):
                 # The search left the fibre at one of many admissible positions.
                 self.prepare(bonds)
-                complete = self.solver.completed(replace(solution, alpha=None))
+                complete = self.solver.completed(self.solver.jumps.balanced(solution))
                 moved, squeezes = self._place_free_fibres(bonds, complete)
                 solution = solution if self._any(squeezes | self._violations(bonds, moved)) else moved
         certificate = self.certificate(bonds, solution, asked)

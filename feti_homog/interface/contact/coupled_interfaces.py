@@ -84,8 +84,7 @@ class CoupledInterfaces:
 
     def traction(self, solutions: Sequence[DualSolution]) -> Float:
         """Return the traction (k, c), tension positive: normal, tangential and, if c = 3, axial."""
-        pairs = zip(self.problems, solutions, strict=True)
-        return np.hstack([problem.traction(solution) for problem, solution in pairs])
+        return np.hstack([problem.traction(s) for problem, s in zip(self.problems, solutions, strict=True)])
 
     def macroscopic(self, solutions: Sequence[DualSolution]) -> Macroscopic:
         """Return the macroscopic strains and stresses of the solutions.  Collective."""

@@ -147,14 +147,15 @@ FALSE = {
         both(attribute("load_factor", state=3), document("path", 3, "load_factor")),
         {"load"},
     ),
-    "a stress of a point": ("path", document("path", 4, "stress", 0), {"tables"}),
+    "a stress of a point": ("path", document("path", 4, "stress", 0), {"mean stress"}),
     "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks", "strength"}),
     "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables", "breaks"}),
     "a stress of a point without fields": ("thinned", document("path", 1, "stress", 0, factor=1.01), {"energy"}),
     "a strain of a point without fields": ("thinned", document("path", 1, "strain", 0), {"load"}),
     "a count of a point without fields": ("thinned", document("path", 1, "bonded", factor=2), {"breaks", "tables"}),
     "the point of a state": (
-        "thinned", attribute("point", factor=2, state=1), {"load", "tables", "breaks", "energy", "strength"},
+        "thinned", attribute("point", factor=2, state=1),
+        {"load", "tables", "mean stress", "breaks", "energy", "strength"},
     ),
     "the points of states": ("thinned", document("states", 1, factor=2), {"tables"}),
     "more states than were asked for": ("thinned", document("case", "output", "states", to=6), {"load"}),
@@ -190,7 +191,7 @@ FALSE = {
         "jump", both(document("path", 7, "closed", to=4), document("path", 7, "open", to=15)), {"strength", "tables"},
     ),
     "a jump away from the point before": (
-        "jump", document("path", 7, "stress", 0, factor=1.01), {"strength", "tables", "energy"},
+        "jump", document("path", 7, "stress", 0, factor=1.01), {"strength", "mean stress", "energy"},
     ),
     "a jump that breaks nothing": ("jump", document("path", 8, "broke", to=0), {"strength", "breaks", "energy"}),
     "a jump before contact changes": (
