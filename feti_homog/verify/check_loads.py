@@ -65,8 +65,7 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
     strain and stress starts at its value at the previous point.
     """
     ends, leg, ended = targets(case), 0, False
-    by_events = case["path"]["method"] == "events"
-    start, last = np.zeros(len(ends[0].values)), None
+    by_events, start, last = case["path"]["method"] == "events", np.zeros(len(ends[0].values)), None
     for point in points:
         along = float(point["load_factor"]) * len(ends)
         while leg < len(ends) - 1 and (ended or along > leg + 1 + ROUNDING):
