@@ -200,11 +200,13 @@ def test_options_that_petsc_alone_knows_pass(tmp_path):
 
 def test_solvers_that_python_keeps_to_its_end_do_not_outlive_petsc(tmp_path):
     """Also if another module, here that of temporary folders, had finalizers before PETSc began."""
+    case = str(case_file(tmp_path, CUT))
     lines = (
         "import tempfile; folder = tempfile.TemporaryDirectory()",
-        f"import feti_homog as f; f.run(f.Case.load({str(case_file(tmp_path, CUT))!r}), quiet=True)",
+        f"import feti_homog as f; from feti_homog import cli; f.run(f.Case.load({case!r}), quiet=True)",
         "from feti_homog.feti.linalg.sparse_direct import DirectSolver; from scipy.sparse import eye",
         "kept = DirectSolver(eye(5).tocsr(), 'feti_sub_'); print('kept')",
+        f"cli.main(['run', {case!r}, '--out', {str(tmp_path / 'out')!r}, '--quiet'])",  # starts PETSc, too
     )
     words, options = [sys.executable, "-c", "\n".join(lines)], {"capture_output": True, "text": True}
     job = subprocess.run(words, env=environment(), timeout=PATIENCE, check=False, **options)

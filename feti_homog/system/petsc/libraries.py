@@ -53,6 +53,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """
     import petsc4py
 
+    is_first = "petsc4py.PETSc" not in sys.modules
     try:
         petsc4py.init([*words, "-skip_petscrc"], comm=comm)
     except (ImportError, ValueError) as error:
@@ -62,12 +63,13 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     from feti_homog.system.petsc import c_functions
 
     def end() -> None:
-        code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # an earlier start may have ended PETSc
+        code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()  # a caller may have ended PETSc
         if code:
             complain(f"error: PETSc cannot end (error code {code}); the results are complete")
             comm.Abort(ExitCode.DEFECT)
 
-    weakref.finalize(PETSc, end)  # at exit, after later finalizers, which destroy solvers
+    if is_first:
+        weakref.finalize(PETSc, end)  # at exit, after later finalizers, which destroy solvers
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
         import numpy as np
         from scipy.linalg import blas
@@ -106,7 +108,5 @@ def _unfit(name: str, error: Exception, advice: str) -> str:
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np
 
-    return (
-        f"{name} was built for another NumPy than {np.__version__}: install NumPy of the major version that it was "
-        "built for, as scripts/bootstrap does"
-    )
+    cure = "install NumPy of the major version that it was built for, as scripts/bootstrap does"
+    return f"{name} was built for another NumPy than {np.__version__}: {cure}"
