@@ -72,15 +72,14 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
         rises = f" {way}" if is_rising else ""
         text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
     later = max(range(event, len(stresses)), key=lambda number: abs(stresses[number]))
-    if later > event and abs(stresses[later]) > abs(peak["stress"]):
-        text += f"; later up to {stresses[later]:.6g} ({noun} {later})"
+    if later > event and abs(stresses[later]) > (1.0 + path_curves.ZERO) * abs(peak["stress"]):
+        text += f"; later {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST and event != end:
         text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
     places = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
     errors = {place: document["path"][k].get("mesh_error") for place, k in places.items() if k is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
-    if parts:
-        text += f"; mesh error of the energy {', '.join(parts)}"
+    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     strains, stress_names = voigt.voigt_names(len(document["path"][0]["stress"]))
     legs: dict[tuple[int, int], int] = {}
@@ -115,8 +114,8 @@ def _load_at(document: Document, number: int, name: str, strain: float) -> str:
 def _path_energies(document: Document, label: str) -> list[str]:
     """Describe the energies along a path.
 
-    The lines give the work of the loads, the energy stored at the end, the energy lost by breaks along all equilibria
-    and under a rising load, frictional heat and fracture energy if any, and the debonded fraction.
+    The lines give the work of the loads, energies stored and lost by breaks, along all equilibria and under a rising
+    load, frictional heat and fracture energy if any, and the debonded fraction.
     """
     points, last = document["path"], dict(document["path"][-1])
     size = max(abs(point["work"]) for point in points)
@@ -125,13 +124,14 @@ def _path_energies(document: Document, label: str) -> list[str]:
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
     lines = [f"Work per area{label}: {last['work']:.6g}", *energies(last, label)]
-    lines.append(f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}")
+    lines.append(f"Dissipated per area{label}: {last['dissipated']:.6g}")
+    if document["case"]["path"]["method"] == "events" and "friction_heat" not in last:  # snap-backs are followed
+        lines[-1] += f" along all equilibria, {rising}"
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}")
         ends = [points[number] for number in path_curves.ends_of_legs(document)]
         for point in reversed(ends[:-1]):
-            names = [name for name in ("strain", "temperature") if name in point]
-            loads = [np.array([point[name], ends[-1][name]]) for name in names]
+            loads = [np.array([point[name], ends[-1][name]]) for name in ("strain", "temperature") if name in point]
             if all(np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max() for pair in loads):  # a closed loop
                 lines[-1] += f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
                 break

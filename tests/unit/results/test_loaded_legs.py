@@ -112,7 +112,7 @@ def test_the_peak_under_a_prescribed_stress_is_one_of_all_equilibria() -> None:
             (1.0, 0.0, {"E11": 0.07, "S11": 90.0}, 1)]  # fmt: skip
     words = text(path([{"S11": 90.0}], rows))
     assert "Peak S11: 18 at E11 = 0.004 (event 0)" in words
-    assert "; then falls by 50.0% to 9 along all equilibria (event 1); later up to 90 (event 2)" in words
+    assert "; then falls by 50.0% to 9 along all equilibria (event 1); later 90 (event 2)" in words
     rows[1] = (0.1, 0.0, {"E11": 0.002, "S11": 9.0}, 1)
     assert "no peak yet: 90 at E11 = 0.07 (event 2)" in text(path([{"E11": 0.07}], rows))
 

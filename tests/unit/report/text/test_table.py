@@ -200,7 +200,7 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
          "ends near its peak, 4.0% below it", "largest stress"),
         ([30, 100, 94], 1, "Peak S11: 100 at", "; then falls by 6.0% to 94 (increment 2)", "peak"),
         ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2)", "peak"),
-        ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2); later up to 90 "
+        ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; then falls by 33.3% to 40 (increment 2); later 90 "
          "(increment 3)", "peak"),
         ([10, 20, 30], 0, "S11 at the end of the path, no peak yet: 30 at", "(increment 2)", "largest stress and end"),
         # Small early falls are saw teeth of a path that rises beyond them, and the end counts, not the valley.
