@@ -51,19 +51,14 @@ class Fields:
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
-        states = [_gathered(self.comm, state) for state in self.states]
-        if mesh is None or fibres is None or interface is None:
-            return None
-        rows = tuple(state for state in states if state is not None)
-        return Fields(self.comm, self.header, mesh, fibres, interface, rows)
+        states = tuple(_gathered(self.comm, state) for state in self.states)
+        return None if self.comm.rank else Fields(self.comm, self.header, mesh, fibres, interface, states)
 
 
-def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """Gather the tables of a part on rank 0, row by row in rank order; None on other ranks.  Collective."""
-    parts = {name: comm.gather(getattr(part, name)) for name in field_layout.tables(part)}
-    if comm.rank:
-        return None
-    joined: dict[str, Any] = {name: np.concatenate(rows or []) for name, rows in parts.items()}
+def _gathered(comm: Intracomm, part: Part) -> Part:
+    """Gather the tables of a part on rank 0, row by row in rank order; other ranks keep their rows.  Collective."""
+    tables = {name: getattr(part, name) for name in field_layout.tables(part)}
+    joined: dict[str, Any] = {name: np.concatenate(comm.gather(rows) or [rows]) for name, rows in tables.items()}
     return replace(part, **joined)
 
 
