@@ -98,3 +98,13 @@ def test_faces_that_touch_without_force_hold_nothing(torn):
     points = followed(interface, NEVER, [[-0.05, -0.05, 0.0], [0.0, 0.0, 0.0]], True)
     pressed, unloaded_again = (point for point in points if point.after.position == 0)
     assert [pressed.state.free_motions, unloaded_again.state.free_motions] == [1, 3]
+
+
+@pytest.mark.one_rank
+def test_a_leg_that_ends_without_load_ends_in_one_point(comm):
+    """At zero load all contact forces and gaps vanish, up to rounding at the very end of the leg."""
+    cell = torn_cells.tear(comm, **THREE)
+    interface = torn_cells.interface(cell, True)
+    points = followed(interface, NEVER, [[0.0, -0.05, 0.01], [0.0, 0.0, 0.0], [0.05, 0.02, 0.0]], True)
+    loads = np.array([point.load_factor for point in points])
+    assert (np.abs(loads - 2 / 3) < 1e-9).sum() == 1 and (np.diff(loads) > 1e-9).all()

@@ -100,8 +100,8 @@ class FrictionlessLeg(Leg):
         # Fractions of the leg at which a bond breaks, contact begins to change, and contact surely has changed; or inf.
         breaks = first_break(cell, self.law, before.bonds, cell.traction(before.solutions), cell.traction(end))
         change = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, before, end[0])
-        begins, certain = change if change[0] != 1.0 else (np.inf, np.inf)
-        breaks, begins, certain = (start + (1.0 - start) * way for way in (breaks, begins, certain))
+        breaks, begins, certain = (start + (1.0 - start) * way for way in (breaks, *change))
+        begins = begins if begins < 1.0 - SAME_SHARE else np.inf
         target = min(breaks, begins, 1.0)
         is_here = target - start <= SAME_SHARE and (target == begins or (target == breaks and self._is_due()))
         reached = is_here or self._approach(target, end)
@@ -120,8 +120,8 @@ class FrictionlessLeg(Leg):
             turned = is_reported and not self._false_alarm
         elif not is_due and self._differs(before):
             self._false_alarm, turned = False, not is_reported
-        # The state after a change is a point, unless a break at this s is a point.
-        if turned and not self._is_overloaded():
+        # The state after a change is a point, unless a break or the end at this s is a point.
+        if turned and not self._is_over() and not self._is_overloaded():
             yield self._turn(self._share)
         yield from self._break_overloaded(is_due)
 
