@@ -168,7 +168,7 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
         if (ratio := k * radii.mean() / _modulus(case, "matrix")) < 50.0:
             line = f"[{section}] {name} = {k:g}: k r / E' = {ratio:.2g}, so the springs take part of the deformation; "
             unit = "; check the unit of length" if ratio < 0.1 else ""
-            lines.append(f"{line}less than 10 % of it with at least {50.0 * k / ratio:.2g}{unit}")
+            lines.append(f"{line}Turon et al. (2007) advise at least {50.0 * k / ratio:.2g}{unit}")
     return lines
 
 

@@ -144,7 +144,7 @@ def test_springs_of_bonds_that_soften_the_cell_are_remarked(keys: Any, remarked:
     if remarked:
         assert "tangential_stiffness = 400000: k r / E' = 0.8" in lines[0] and "unit" not in lines[0]
         assert with_springs(1e3, 1e8)[0].endswith("check the unit of length")
-        limit = float(re.search(r"less than 10 % of it with at least (\S+)", lines[0])[1])
+        limit = float(re.search(r"Turon et al. \(2007\) advise at least (\S+)", lines[0])[1])
         assert 0.9 < C11(limit) / C11(None) < 0.99 and C11(limit / 50.0) < 0.5 * C11(None)
 
 
