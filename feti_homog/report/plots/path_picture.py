@@ -142,12 +142,15 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
     """Draw counts of bonded, open and closed nodes: thin lines at all equilibria, thick lines at a rising load."""
     points, drawn = document["path"], list[Array]()
     rising = path_curves.rising_points(points) if path_curves.is_proportional(document) else None
+    # Without load any status is right: that of the point before is drawn.
+    stored = np.array([point.get("stored") or 0.0 for point in points])
+    loaded = np.maximum.accumulate(np.where(stored >= path_curves.ZERO**2 * stored.max(), range(len(points)), 0))
     # The bonds of an event break at the event, the bonds of an increment on the way to it.
     by_events = document["case"]["path"]["method"] == "events"
     way: dict[str, Any] = {"drawstyle": "steps-pre"} if by_events and rising is None else {}
     for kind, key in STATES.items():
         ink, label = drawn_cell.STATE_COLOURS[kind], drawn_cell.STATE_NAMES[kind]
-        count = np.array([point[key] for point in points])
+        count = np.array([points[number][key] for number in loaded])
         line: dict[str, Any] = {"color": ink, "linestyle": _line_style(count, drawn), "label": label}
         if rising is None:
             axes.plot(strain, count, **line, linewidth=1.4, **way, **style)

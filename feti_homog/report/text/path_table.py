@@ -65,13 +65,14 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
             text += f"; {title.replace('_', ' ')}{within}{_landmark(document, peak, title)}"
     stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
-        lost = 1.0 - peak["stress_left"] / peak["stress"]
-        is_rising = noun == "event" and leg_of[peak["event_left"]] == 1
+        left, lost = peak["event_left"], 1.0 - peak["stress_left"] / peak["stress"]
+        is_rising = noun == "event" and leg_of[left] == 1
         is_given = path_curves.targets(document)[0].get(peak["stress_name"])
         way = "along all equilibria" if is_given else f"as the {path_curves.what_rises(document)} rises"
         rises = f" {way}" if is_rising else ""
-        text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({noun} {peak['event_left']})"
-    later = max(range(event, len(stresses)), key=lambda number: abs(stresses[number]))
+        before = "before " if abs(peak["stress_left"] - stresses[left]) > path_curves.noise(document) else ""
+        text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({before}{noun} {left})"
+    later = event + int((stresses[event:] * np.sign(peak.get("stress", 1.0))).argmax())
     if later > event and abs(stresses[later]) > (1.0 + path_curves.ZERO) * abs(peak["stress"]):
         text += f"; later {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST and event != end:
@@ -87,7 +88,8 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
         legs.setdefault((k, number), leg)  # a leg that unloads may begin at the largest stress of the leg before
     for (k, number), leg in legs.items():
         strain, stress = document["path"][number]["strain"][k], path_curves.stresses(document)[number, k]
-        if strains[k] != peak["strain_name"] and stress:
+        is_given = stress_names[k] in path_curves.targets(document)[leg - 1]
+        if strains[k] != peak["strain_name"] and stress and not is_given:
             name, at = stress_names[k] + stress_label(document), _load_at(document, number, strains[k], strain)
             lines.append(f"Largest {name} of leg {leg}: {stress:.6g} at {at} (point {number})")
     if path_curves.scales_with_toughness(document) and path_curves.legs(document) == 1:

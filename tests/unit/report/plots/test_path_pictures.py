@@ -183,3 +183,14 @@ def test_energies_at_rising_loads_and_results_without_energies() -> None:
     top = figure.axes[0].collections[-1].get_paths()[0].vertices
     assert work[-1] == 8.0 and any(np.allclose(corner, [0.02, 8.0]) for corner in top)
     assert path_picture.energies(path_of_points([0.5, 0.6, 1.0])) is None
+
+
+def test_statuses_of_the_unloaded_cell_are_the_statuses_before() -> None:
+    """Nodes that compression closes are drawn closed until the load is zero, where the solver finds none closed."""
+    legs, rows = [{"E11": -0.02}, {"E11": 0.0}, {"E11": 0.01}], [(-0.02, 2, 0), (0.0, 0, 2), (0.01, 0, 2)]
+    document = bar(legs, [((k + 1) / 3, 100.0, strain, False) for k, (strain, _, _) in enumerate(rows)])
+    for point, (_, closed, opened) in zip(document["path"], rows, strict=True):
+        point |= {"bonded": 5, "closed": closed, "open": opened}
+    lower = path_picture.figure(document).axes[-1]
+    drawn_counts = {line.get_label(): [*line.get_ydata()] for line in lower.lines}
+    assert drawn_counts["in contact"] == [2, 2, 0] and drawn_counts["open"] == [0, 0, 2]

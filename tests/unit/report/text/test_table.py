@@ -175,7 +175,7 @@ def test_what_is_left_is_that_after_the_peak() -> None:
     lines = _peak_lines({"case": case, "path": [point] * 4}, peak)
     assert " ".join(" ".join(lines).split()) == (
         "Peak S11 (MPa): 40 at E11 = 0.006 (event 1); first break 30 at 0.005 (event 2); "
-        "then falls by 50.0% to 20 as the strain rises (event 3)"
+        "then falls by 50.0% to 20 as the strain rises (before event 3)"
     )
 
 
