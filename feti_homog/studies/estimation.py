@@ -21,7 +21,7 @@ CONFIDENCE = 0.95
 QUANTILE = float(norm.ppf((1 + CONFIDENCE) / 2))
 LEAST_CHANCE = 1e-3  # probability of such or larger residuals, below which the model is refused
 # Directions with a smaller relative singular value are undetermined; smaller entries of a direction are rounding.
-RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
+RANK_TOLERANCE, ENTRY = 1e-6, 1e-4
 STEP, MOST_EVALUATIONS = 1e-5, 60  # the relative step that ends the search is far below 1 % differences and std
 Model = Callable[[Float], Float]
 

@@ -91,6 +91,15 @@ def test_directions_without_data_are_named_and_not_followed():
     ]
 
 
+def test_an_unknown_beside_a_weaker_one_is_undetermined():
+    """Fit x0 + x1 / 200: x0 moves by 0.5 % where x1, which no other value determines, doubles."""
+    A = np.outer(TIMES + 1.0, [1.0, 0.005])
+    found = fitted(A @ [1.0, 2.0], std=1e-4, start=(1.2, 3.0), model=lambda x: A @ x, jacobian=lambda x: A)
+    assert found.rank == 1 and np.isinf(found.std).all()
+    words = "[unknown] strength, stiffness: the measured values do not determine them together"
+    assert names_of(found.undetermined, ["strength", "stiffness"]) == [words]
+
+
 def test_units_do_not_decide_where_the_search_ends():
     """The first unknown in 1e-9 of its unit, beside one of order 1."""
     unit = np.array([1e9, 1.0])
