@@ -167,5 +167,5 @@ def unlike_units(materials: Mapping[str, material_forms.Material]) -> list[str]:
 
 
 def provider(phase: str, materials: Mapping[str, material_forms.Material]) -> str:
-    """Return the phase that provides the material: the phase itself or, for "fibre:2" without a section, "fibre"."""
+    """Return the phase that provides the material: the phase itself or, for "fibre:2" without a table, "fibre"."""
     return phase if phase in materials else phase.partition(":")[0]

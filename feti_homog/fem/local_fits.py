@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 @dataclass(frozen=True)
 class PatchNeighbours:
-    """The n pairs of boundary vertex and neighbour: the fit includes the neighbour's elements with weight NEIGHBOURS.
+    """The n boundary vertices whose fits include the elements of a neighbour, with weight NEIGHBOURS.
 
     Attributes:
         at, other: (n,) boundary vertex and neighbour vertex.

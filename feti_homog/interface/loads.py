@@ -213,7 +213,7 @@ class LoadScales:
         return np.asarray(sizes)
 
     def excess(self, strain: Float, asked: Float) -> float:
-        """Return the ratio of the largest imposed strains of `strain` (v,) and `asked` (v,); 0 if `asked` is zero."""
+        """Return the largest imposed component of `strain` (v,) over that in `asked` (v,); 0 if `asked` is zero."""
         return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:

@@ -26,7 +26,7 @@ def read_labels(path: Path, labels: Mapping[str, str], is_mirrored: bool) -> tup
     alphabetical order, voids last. `is_mirrored` puts the mirror images beside and above the image.
 
     Raises:
-        CaseError: the file is too large or no image of whole numbers, or its numbers are not the keys of `labels`.
+        CaseError: the file is too large or not an image of whole numbers, or its numbers are not the keys of `labels`.
     """
     image = read_image(path)
     numbers, counts = np.unique(image, return_counts=True)

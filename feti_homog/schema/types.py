@@ -60,7 +60,7 @@ class ValueType:
 
 
 def hint(value: Any) -> str:
-    """Return a hint on a wrong magnitude or a table of scatter, also in a list; empty for other values."""
+    """Return a hint on a value, or an entry of a list, with scatter or beyond the limits; otherwise an empty string."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(hint, value)), "")
     if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):

@@ -20,7 +20,7 @@ ROUNDED_TERMS = 1e-5
 
 
 class Scales(NamedTuple):
-    """The scales of a loaded cell with intact bonds: strain, stress, displacement E x."""
+    """The scales of strains, stresses and displacements in a loaded cell with intact bonds."""
 
     strain: float
     stress: float

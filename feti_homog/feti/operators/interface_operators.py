@@ -35,7 +35,7 @@ class SubdomainSize:
     Attributes:
         dofs: number of degrees of freedom.
         boundary_dofs: number n of degrees of freedom on nodes with constraints.
-        is_whole_body: whether every shared node has one other sharer, in another body.
+        is_whole_body: whether exactly one other subdomain, of another body, shares each node.
         has_springs: whether the subdomain is an inner body with springs; then S~ (`with_springs`) is dense.
     """
 

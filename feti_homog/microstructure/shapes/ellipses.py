@@ -135,7 +135,7 @@ class Ellipses(ConvexCurves):
         return np.asarray(self.centres + along / self.support(normal)[:, None])
 
     def bend(self, normal: Float) -> Float:
-        """Return the radii of curvature det(F)^2 / |F^T n|^3 (k,) where the outward unit normals are n (k, 2)."""
+        """Return radii of curvature (k,), det(F)^2 / |F^T n|^3, with `frames` F and outward normals n (k, 2)."""
         return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
 
     def normal(self, angle: Float) -> Float:
