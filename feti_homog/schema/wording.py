@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 LONGEST_VALUE = 60  # characters of a value in a message
 # Names of quantities in other programs and textbooks, in lower case, and keys of this program for them.
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
+    **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1", "shape")),
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion", "expansion_axial", "expansion_transverse")),
