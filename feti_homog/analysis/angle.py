@@ -15,8 +15,8 @@ from feti_homog.homogenization import averaging
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Compute the `Result` entry `angle`, with a point for each debonding angle in the case.  Collective.
 
-    A point has the stress and energies under the strain of the case or, if the case gives none, the stiffness from unit
-    loads; also energy release rates at tips.  A solve starts from the multipliers at the previous angle.
+    A point has energy release rates at tips, and stress and energies under the strain of the case or, if the case gives
+    no strain, the stiffness from unit loads.  A solve starts from the multipliers at the previous angle.
     """
     section = context.case.section
     assert isinstance(section, load_sections.Angle)

@@ -75,7 +75,7 @@ class CellLoads:
     def means(self, responses: Sequence[averaging.Response]) -> dict[str, Float | float]:
         """Return macroscopic `strain` and `stress`, and `temperature` if it is a load, by name.
 
-        `responses` has one for each problem under the same load.
+        `responses` are the responses of all problems to the same load.
         """
         strain = phase_laws.components(*(response.strain for response in responses))
         stress = phase_laws.components(*(response.stress for response in responses))
@@ -182,7 +182,6 @@ class AnalysisContext:
                 self.progress.say(self.checks.record(f"{prefix}{name}", response))
         columns = self.loads.secants(responses, sign)
         errors, responses = self.response_errors(self.loads.by_problem(responses))
-
         in_plane = len(self.plane.loads) if self.cell.solver.problem.turns else 0
         states = dict[str, Sequence[averaging.Response | None]]()
         for number, (name, response) in enumerate(zip(self.loads.names, responses, strict=True)):
@@ -220,15 +219,12 @@ class AnalysisContext:
 
         Debonding is under gamma12 or, with a single load, under this load; iterations are summed over the responses.
         """
-        last = responses[: len(voigt.STRAINS)][-1]
-        length = self.fibre_interfaces.length(last.state.status != BONDED)
-        debonding = {
-            "debonded_share": self.fibre_interfaces.share(length),
-            "debonded_length": length,
-            "debonding_angle": self.fibre_interfaces.angle(length),
-        }
+        last, faces = responses[: len(voigt.STRAINS)][-1], self.fibre_interfaces
+        length = faces.length(last.state.status != BONDED)
+        debonding = {"debonded_share": faces.share(length), "debonded_length": length}
+        debonding["debonding_angle"] = faces.angle(length)
         if len(self.case.interfaces) > 1:
-            debonding["debonded_shares"] = self.fibre_interfaces.shares(last.state.status)
+            debonding["debonded_shares"] = faces.shares(last.state.status)
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     def loaded_point(self, responses: Sequence[averaging.Response]) -> dict[str, Any]:
@@ -247,10 +243,13 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List `notes`, and remarks on singular stresses, undetermined strains and absurdly large strains."""
+        """List `notes`, and remarks on corners, singular stresses, undetermined strains and absurdly large strains."""
         lines, label = [*self.notes], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses beside {' and '.join(places)} rise without limit with finer elements")
+        if self.cell.summary.corner_edges > 3 and self.case.output.mesh_error:
+            sizes = "for moduli 10 to 1000 times larger 2 to 6 times, in axial shear and conduction 5 to 20 times"
+            lines.append(f"[cell] phases meet at points: mesh errors exceed their estimates, {sizes}")
         if names := [name for name in voigt.SPATIAL_STRAINS if any(name in free for free in self.undetermined)]:
             points = f" at {sum(map(bool, self.undetermined))} of {len(self.undetermined)} points"
             where = points if self.case.section.is_followed else ""

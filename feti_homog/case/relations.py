@@ -130,7 +130,7 @@ def _written(value: Any) -> str:
 
 
 def _held(interfaces: list[InterfaceSection]) -> list[InterfaceSection]:
-    """Return the sections; bonds without constants, which hold, get 1e4 times the normal ones of breaking bonds."""
+    """Return the sections; bonds that hold, without constants, get 1e4 times the normal constants of breaking ones."""
     names = (*STIFFNESSES, *COHESIVE)
     breaking = next((bond for bond in interfaces if all(getattr(bond, name) for name in names)), None)
     if breaking is None:

@@ -36,7 +36,7 @@ class CellSummary:
         frames: (constituents, 2, 2) as in `Ellipses`, for fibres that are circles or ellipses; else NaN.
         snapped: largest distance by which a node in a user's mesh was moved to make opposite sides match.
         origin: lower left corner of the cell in the user's coordinates; all other positions are relative to the corner.
-        has_corners: whether straight edges between phases, or beside voids, meet at an angle.
+        corner_edges: most edges between phases, or beside voids, that meet at a corner; 0 without corners.
         voids, moved_tips: number of voids; for each interface, the tips that the mesher moved.
         remarks: lines about unexpected cell properties.
         across: whether subdomains reach across materials.
@@ -62,7 +62,7 @@ class CellSummary:
     voids: int
     remarks: tuple[str, ...]
     shift: Float
-    has_corners: bool = False
+    corner_edges: int = 0
     across: bool = False
     interface_nodes: int | None = None
 
@@ -167,7 +167,7 @@ def distribute(
         voids=torus.voids,
         remarks=(*cell_remarks.case_remarks(case, bonds), *cell_remarks.mesh_remarks(case, torus, pairs, radii), *text),
         shift=mesh.shift,
-        has_corners=mesh_fibres.has_corners(torus),
+        corner_edges=mesh_fibres.corner_edges(torus),
         across=across,
         interface_nodes=bonds if across else None,
     )

@@ -113,7 +113,7 @@ def nodal_fields(cell: TornCell, response: Response | None, u: Float, problem: P
 
 def singularities(cell: TornCell, states: Sequence[Response | None]) -> set[str]:
     """Name the places at which stresses of plane states would grow without limit on finer meshes.  Collective."""
-    places = {"corners of phases"} if cell.summary.has_corners else set[str]()
+    places = {"corners of phases"} if cell.summary.corner_edges else set[str]()
     nodes, rigid = cell.solver.jump_operator.nodes, np.array([b.normal_stiffness is None for b in cell.case.interfaces])
     masks = [s.state.status == Contact.BONDED for s in states if rigid.any() and s is not None and s.debonded]
     if masks:

@@ -102,8 +102,8 @@ def fibre_frames(torus: Torus) -> Float:
     return frames
 
 
-def has_corners(torus: Torus) -> bool:
-    """Return whether straight edges between phases, or beside voids, meet at an angle above LEAST_CORNER."""
+def corner_edges(torus: Torus) -> int:
+    """Return the most straight edges between phases, or beside voids, at a corner (above LEAST_CORNER); 0 without."""
     is_straight = torus.is_outline
     is_straight[torus.torus_edge[torus.arcs]] = False
     ends = torus.low_copies(is_straight)
@@ -113,7 +113,7 @@ def has_corners(torus: Torus) -> bool:
     # Of two unit vectors from a node, the sum has the length 2 sin(angle / 2).
     sums = np.array([np.bincount(node.ravel(), np.stack([x, -x], axis=1).ravel(), len(nodes)) for x in along.T])
     angles = np.where(counts == 2, np.linalg.norm(sums, axis=0), 0.0)
-    return bool((counts > 2).any() or (angles > 2.0 * np.sin(np.radians(LEAST_CORNER / 2.0))).any())
+    return int(counts[(counts > 2) | (angles > 2.0 * np.sin(np.radians(LEAST_CORNER / 2.0)))].max(initial=0))
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:

@@ -196,3 +196,14 @@ def test_ranks_agree_and_files_obey_every_law(comm, shared_path):
         alone = compute(case, MPI.COMM_SELF).effective_stiffness
         assert np.abs(together - alone).max() < 1e-9 * alone.max()
         assert_certified(comm, shared_path / name)
+
+
+def test_mesh_errors_exceed_their_estimates_where_phases_meet_at_points(comm, shared_path):
+    """A checkerboard has the conductivity sqrt(k_1 k_2) (Keller, J. Math. Phys. 5, 1964, 548)."""
+    path = saved(comm, shared_path / "board.npy", np.kron(np.eye(2), np.ones((4, 4))).astype(np.uint8))
+    materials = {"matrix": {"conductivity": 1.0}, "fibre": {"conductivity": 10.0}}
+    cell = {"pixel": 1 / 8, "order": 2, "refine": 1}
+    result = solved(comm, path, cell, material=materials, analysis={"type": "conductivity"})
+    error = result.effective_conductivity[0, 0] - np.sqrt(10.0)
+    assert 4.0 < error / result.mesh_error.effective_conductivity[0, 0] < 20.0
+    assert any("phases meet at points: mesh errors exceed their estimates" in line for line in result.remarks)

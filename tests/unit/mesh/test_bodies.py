@@ -15,7 +15,7 @@ from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, 
 from feti_homog.case.cell_section import Cell
 from feti_homog.homogenization import cell_remarks
 from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.mesh_fibres import fibre_circles, fibre_numbers, has_corners
+from feti_homog.mesh.mesh_fibres import corner_edges, fibre_circles, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.submeshes import pinned_classes
@@ -89,13 +89,13 @@ def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):
 
 
 @pytest.mark.parametrize(("fibre", "expected"), [
-    (lambda x, y: abs(x - 0.5) < 0.25, False),
-    (lambda x, y: max(abs(x - 0.5), abs(y - 0.5)) < 0.25, True),
-    (lambda x, y: (x < 0.5) == (y < 0.5), True),
+    (lambda x, y: abs(x - 0.5) < 0.25, 0),
+    (lambda x, y: max(abs(x - 0.5), abs(y - 0.5)) < 0.25, 2),
+    (lambda x, y: (x < 0.5) == (y < 0.5), 4),
 ], ids=["stripe", "square", "checkerboard"])  # fmt: skip
 def test_stripes_have_no_corners(fibre, expected, tmp_path):
     grid(fibre).write(tmp_path / "good.msh")
-    assert has_corners(Torus.of(read(tmp_path / "good.msh"))) == expected
+    assert corner_edges(Torus.of(read(tmp_path / "good.msh"))) == expected
 
 
 @pytest.mark.parametrize("lines", [RIGHT_SIDE, ALL_SIDES], ids=["open", "closed"])

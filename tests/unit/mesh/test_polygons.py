@@ -17,7 +17,7 @@ from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
-from feti_homog.mesh.mesh_fibres import has_corners
+from feti_homog.mesh.mesh_fibres import corner_edges
 from feti_homog.mesh.outline.graded_size import MIN_EDGES_AROUND, MeshSizes
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.microstructure.arrangements import Arrangement
@@ -48,7 +48,7 @@ def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
 
 def test_rounded_polygons_have_no_corners():
     for corner in (0.0, 0.3):
-        assert has_corners(Torus.of(generate(case_of(SQUARE | {"corner": corner}).cell))) == (corner == 0.0)
+        assert corner_edges(Torus.of(generate(case_of(SQUARE | {"corner": corner}).cell))) == 2 * (corner == 0.0)
 
 
 def gap_between(*rows):
