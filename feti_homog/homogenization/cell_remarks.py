@@ -58,7 +58,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
-    lost = cut_off(torus.mesh, case.cell.refine) if case.cell.has_own_mesh and case.cell.order == 1 else 0.0
+    lost = cut_off(torus.mesh, case.cell.refine) if case.cell.order == 1 and not case.cell.fractions else 0.0
     if lost > SAME_RATIO / 2:
         lines.append(f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2")
     cell, matrix = case.cell, torus.mesh.triangles[torus.mesh.phase == 0]

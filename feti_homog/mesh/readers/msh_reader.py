@@ -135,11 +135,11 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     """Move outer nodes onto the sides of a rectangle; also return the largest move.
 
-    Outer nodes within `tolerance`, relative to the width, of the outermost node move to a side at their median. Two
-    nodes on opposite sides are partners if each is the nearest to the other, within the tolerance along the side; both
-    move to the mean position along the side, except corners. Middle nodes on sides move midway between the edge ends.
-    Nodes beyond the tolerance stay, and meshes with nodes that are not finite do not change: later checks report such
-    nodes.
+    A side is at the median of outer nodes within twice the `tolerance`, relative to the width, of the outermost node.
+    Outer nodes within the tolerance move to the side. Two nodes on opposite sides are partners if each is the nearest
+    to the other, within the tolerance along the side; both move to the mean position along the side, except corners.
+    Middle nodes on sides move midway between the edge ends. Nodes beyond the tolerance stay, and meshes with nodes that
+    are not finite do not change: later checks report such nodes.
     """
     plane = raw.points[:, :2].copy()
     outer = np.unique(raw.border)
@@ -150,9 +150,9 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     for axis in (0, 1):
         for end, extreme in (("low", np.min), ("high", np.max)):
             along = plane[outer, axis]
-            side = outer[np.abs(along - extreme(along)) <= reach]
-            plane[side, axis] = np.median(plane[side, axis])
-            sides[axis, end] = side
+            place = np.median(along[np.abs(along - extreme(along)) <= 2.0 * reach])
+            sides[axis, end] = outer[np.abs(along - place) <= reach]
+            plane[sides[axis, end], axis] = place
     for axis in (0, 1):
         low, high, along = sides[axis, "low"], sides[axis, "high"], plane[:, 1 - axis]
         distance, to_high = cKDTree(along[high, None]).query(along[low, None])

@@ -106,6 +106,18 @@ def test_sides_that_nearly_match_name_the_distance_and_the_tolerance_that_snaps_
     assert all(away / 2 < read(path, snap=float(word)).snapped * (1 + 1e-9) <= 1.01 * away for word in tolerances)
 
 
+def test_a_side_that_bends_both_ways_is_snapped_with_the_proposed_tolerance(tmp_path):
+    """Two nodes lie outside the side and one inside, all at the same distance; smaller tolerances name this one."""
+    moves = {node(4, 0): (1.0001, 0.0), node(4, 4): (1.0001, 1.0), node(4, 2): (0.9999, 0.5)}
+    path = written(grid().moved(**{f"n{tag}": place for tag, place in moves.items()}), tmp_path / "bent.msh")
+    for snap in (None, 5e-5, 9e-5):
+        with pytest.raises(MeshError, match="snap_tolerance") as error:
+            read(path, snap=snap)
+        assert "mesh both sides" not in str(error.value)
+        for word in re.findall("snap_tolerance = ([0-9.e-]+)", str(error.value)):
+            assert read(path, snap=float(word)).snapped == pytest.approx(1e-4, rel=1e-3)
+
+
 def test_more_nodes_on_one_side_than_on_the_other_cannot_be_snapped(tmp_path):
     mesh, (a, b, c) = grid(), grid().elements[23][3]
     mesh = replace(mesh, nodes={**mesh.nodes, 99: (1.0, 0.51, 0.0)})
