@@ -244,7 +244,7 @@ class AnalysisContext:
 
     def remarks(self) -> list[str]:
         """List `notes`, and remarks on corners, singular stresses, undetermined strains and absurdly large strains."""
-        lines, label = [*self.notes], f"[{self.case.analysis.type}]"
+        lines, label = [*dict.fromkeys(self.notes)], f"[{self.case.analysis.type}]"
         if places := sorted(self.states.singularities):
             lines.append(f"largest stresses beside {' and '.join(places)} rise without limit with finer elements")
         if self.cell.summary.corner_edges > 3 and self.case.output.mesh_error:

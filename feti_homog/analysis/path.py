@@ -88,8 +88,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], checkpoints.Arrays]) -> None:
     """Write the event of point `number` to the checkpoint; prepare the remark for an interruption.  Collective."""
     context.checkpoint.write(number, *event)
-    if context.directory is not None:
-        folder = context.directory
+    if folder := context.directory:
         line = f"{number + 1} points are in {folder}: `plot {folder}` draws them; to go on, add --resume to `run`"
         standard_streams.remarks[:] = [f"{line}; a study goes on by itself"]
 

@@ -142,7 +142,6 @@ def _run_and_write(
     if cell.case.section.is_followed and not result.faults:
         context.checkpoint.clear()
     standard_streams.remarks.clear()
-
     if output.pictures:
         with progress.stage("pictures") as line:
             from feti_homog.report.plots import figures  # loads Matplotlib

@@ -41,7 +41,7 @@ def criterion_of(cell: unit_cell.TornCell, grows: bool = False) -> BondLaw:
 
 
 def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averaging.Response]]) -> TipRates:
-    """Compute energy release rates at tips under each load but a unit temperature; no rows without tips.  Collective.
+    """Compute energy release rates at tips on circles under all loads but a unit temperature; note others.  Collective.
 
     `responses` maps a unit load to its only response, and any other load to a response for each problem.
     """
@@ -62,6 +62,10 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
     table["fibre"] = tuple(table["fibre"].astype(int).tolist())
     table["interface"] = _sections(context.cell, table["interface"])
     table["G_III"] = table["G_III"] if context.cell.axial else None
+    status, faces, cell = next(iter(responses.values()))[0].state.status, context.fibre_interfaces, context.cell.summary
+    others = np.flatnonzero((faces.length(status != BONDED) > 0.0) & np.isnan(cell.radii[cell.fibre_bodies])) + 1
+    if numbers := ", ".join(map(str, np.setdiff1d(others, faces.loose(status)))):
+        context.notes.append(f"[interface] fibre {numbers}: no energy release rates at tips, which only circles have")
     return TipRates(**table)
 
 

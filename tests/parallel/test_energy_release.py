@@ -135,6 +135,17 @@ def test_stiffness_has_the_tips_of_all_its_loads(comm):
     parallel_assert(comm, totals[1] == pytest.approx(totals[0], rel=1e-6))
 
 
+def test_a_remark_names_fibres_whose_tips_have_no_rate(comm):
+    """Only tips on circles have rates; a fibre that is debonded all around has no tips."""
+    shapes = [{"x": 0.5, "y": 0.5, "radius": 0.2}, *({"x": x, "y": 0.5, "a": 0.4, "b": 0.2} for x in (1.5, 2.5))]
+    cell = {"geometry": "table", "width": 3.0, "height": 1.0, "mesh_size": 0.1, "fibre_list": shapes}
+    arcs = [{"fibre": k, "centre": 0.0, "angle": angle} for k, angle in ((1, 20.0), (2, 120.0), (3, 360.0))]
+    result = run(case_of(cell, interface={"debonded": arcs, "contact": False}), comm)
+    parallel_assert(comm, set(result.tips.fibre) == {1})
+    lines = [line for line in result.remarks if "no energy release rates" in line]
+    parallel_assert(comm, lines == ["[interface] fibre 2: no energy release rates at tips, which only circles have"])
+
+
 @pytest.mark.parametrize(("load", "label"), [({"S11": 0.1}, "load"), ({"E11": 0.01, "E22": 0.0}, "strain")])
 def test_tips_name_a_load_by_what_it_gives(comm, load, label):
     arc = {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]}

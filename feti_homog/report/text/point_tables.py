@@ -30,7 +30,7 @@ ONSET = {
 RATES = (*(Column(name) for name in ("G", "G_I", "G_II", "G_III")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
          Column("angle", 9), Column("interface", 11, "d"))  # fmt: skip
 LAST_STRAIN = "C33: shear; bonded, open, closed: interface nodes under the unit strain gamma12"
-TIP_TITLE = "Largest energy release rate"
+TIP_TITLE = "Largest energy release rate at tips on circles"
 
 Point = Mapping[str, Any]
 

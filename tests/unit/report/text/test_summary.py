@@ -223,7 +223,7 @@ def test_the_state_under_a_load_is_reported() -> None:
         "12.5 % of the interfaces"
     )
     assert "9 bonded, 9 open, 1 closed interface nodes" in text and "Free motions of fibres: 2" in text
-    assert "Largest energy release rate (GPa mm)" in text
+    assert "Largest energy release rate at tips on circles (GPa mm)" in text
 
 
 def test_bounds_are_those_of_bonded_cells_only() -> None:
@@ -253,7 +253,7 @@ def bonding(**top: Any) -> dict[str, Any]:
 def test_the_largest_energy_release_rate_of_each_load_is_reported() -> None:
     tips = [("E11", 3.0, 1, 60.0), ("E11", 6.0, 12, -60.0), ("-E11", 0.0, 1, 60.0), ("-E11", 1e-12, 2, 60.0)]
     text = summary(bonding(tips=tips_of(*tips)))
-    assert "Largest energy release rate (GPa mm)" in text
+    assert "Largest energy release rate at tips on circles (GPa mm)" in text
     assert line(text, "E11 ").split() == ["E11", "6", "2", "4", "54.7", "12", "-60"]
     assert line(text, "-E11").split()[-2:] == ["2", "60"] and max(map(len, text.splitlines())) < 80
     assert "energy release" not in summary(bonding(tips=tips_of())) and "energy release" not in summary(bonding())
@@ -272,7 +272,7 @@ def test_energy_release_rates_against_the_angle() -> None:
     tips = tips_of(("E11", 3.0, 1, 60.0), ("E22", 6.0, 1, 60.0))
     points = [{"angle": 0.0, "tips": tips_of()} | stiff, {"angle": 60.0, "tips": tips} | stiff]
     lines = summary(bonding(angle=points)).splitlines()
-    where = lines.index("Largest energy release rate (GPa mm) under each load")
+    where = lines.index("Largest energy release rate at tips on circles (GPa mm) under each load")
     assert [text.split() for text in lines[where + 1 : where + 4]] == [["angle", "E11", "E22"], ["60", "3", "6"], []]
     given = [
         {"angle": 60.0, "stress": [1.0, 0.0, 0.0], "tips": tips_of(("strain", 3.0, 1, 60.0), ("strain", 5.0, 2, 60.0))}
@@ -280,7 +280,7 @@ def test_energy_release_rates_against_the_angle() -> None:
     ]
     lines = summary(bonding(angle=given)).splitlines()
     assert "C33: shear" not in "".join(lines)
-    where = lines.index("Largest energy release rate (GPa mm)")
+    where = lines.index("Largest energy release rate at tips on circles (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]
 
 
