@@ -6,6 +6,7 @@ Picture modules find an analysis by name, such as in `response_curves.CURVES`.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from math import floor, log10
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -218,12 +219,12 @@ def phase_tables(document: Document) -> list[Table]:
     pairs = [(phase, k) for k in states for phase in phases]
     names = [f"{labels[k]} {phase['phase']}" if len(labels) > 1 else phase["phase"] for phase, k in pairs]
     first = Column("", -max(16, *(len(name) + 2 for name in names)), indent=0)
-    unit = with_micro(document["case"].get("output", {}).get("length_unit", ""))
+    unit, width = with_micro(document["case"].get("output", {}).get("length_unit", "")), document["cell"]["width"]
     head = f"at x, y ({unit})" if unit else "at x, y"
     at = Column(head, max(16, len(head) + 1))
     heads = [first, *(column for title in STRESSES.values() for column in (Column(title), at))]
     rows = [
-        [name, *(value for measure in STRESSES for value in _entry(phase, measure, k))]
+        [name, *(value for measure in STRESSES for value in _entry(phase, measure, k, width))]
         for name, (phase, k) in zip(names, pairs, strict=True)
     ]
     loads = ""
@@ -245,12 +246,10 @@ def phase_tables(document: Document) -> list[Table]:
     rows = []
     for name, (phase, k) in zip(names, pairs, strict=True):
         if "criterion" in phase:
-            value, place = _entry(phase, "utilisation", k)
+            value, place = _entry(phase, "utilisation", k, width)
             row = [name, phase["criterion"], value, place]
-            if has_modes:
-                row.append(phase["mode"][k] if phase.get("mode") and value else UNKNOWN)
-            if has_factors:
-                row.append(1.0 / value if value else UNKNOWN)
+            row += [phase["mode"][k] if phase.get("mode") and value else UNKNOWN] if has_modes else []
+            row += [1.0 / value if value else UNKNOWN] if has_factors else []
             rows.append([*row, *(load[stress] / value if value else UNKNOWN for stress in stresses)])
     if rows:
         tables.append(Table(f"Utilisation of the strengths{loads}", heads, rows, below=notes))
@@ -277,7 +276,8 @@ def _states(document: Document, count: int) -> Sequence[int]:
     return [point * loads + load for point in range(0, points, step) for load in range(loads)]
 
 
-def _entry(phase: Document, name: str, k: int) -> tuple[Any, str]:
-    """Return the k-th value of a quantity without noise, and its position "x, y", or "-" if the value is zero."""
-    value, (x, y) = without_noise(phase[name][k]), phase[f"{name}_at"][k]
-    return value, f"{x:.3g}, {y:.3g}" if value else "-"
+def _entry(phase: Document, name: str, k: int, width: float) -> tuple[Any, str]:
+    """Return the k-th value of a quantity without noise, and "x, y" to 1e-3 of the cell's `width`; "-" for zero."""
+    value, digits = without_noise(phase[name][k]), 3 - floor(log10(width))
+    x, y = (round(coordinate, digits) + 0.0 for coordinate in phase[f"{name}_at"][k])
+    return value, f"{x:.10g}, {y:.10g}" if value else "-"

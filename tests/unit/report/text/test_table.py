@@ -100,7 +100,7 @@ def test_places_of_largest_stresses_are_coordinates_with_a_unit(unit, head):
     measures = (*STRESSES, "utilisation")
     phase = {"phase": "fibre", "state": ["E11"], "criterion": "principal"} | {name: [2.0] for name in measures}
     phase |= {f"{name}_at": [[0.25, 0.5]] for name in measures}
-    document = {"case": {"output": {"length_unit": unit}}, "phase_stresses": [phase]}
+    document = {"case": {"output": {"length_unit": unit}}, "phase_stresses": [phase], "cell": {"width": 1.0}}
     largest, used = phase_tables(document)
     assert (
         largest.below == []
@@ -110,6 +110,13 @@ def test_places_of_largest_stresses_are_coordinates_with_a_unit(unit, head):
     for table in (largest, used):
         heads, (cells,) = table.lines[1], table.lines[2:3]
         assert heads.index(head) + len(head) == cells.index("0.25, 0.5") + len("0.25, 0.5")
+    for width, place, words in (
+        (60.0, (1250.1234, 830.0), "1250.12, 830"),
+        (2e-5, (1.23456e-5, -1e-12), "1.235e-05, 0"),
+    ):
+        far = phase | {name: [place] for name in phase if name.endswith("_at")}
+        (row,) = phase_tables(document | {"phase_stresses": [far], "cell": {"width": width}})[0].cells
+        assert row[2] == words
 
 
 CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviation": 0.002}
