@@ -206,4 +206,5 @@ def test_mesh_errors_exceed_their_estimates_where_phases_meet_at_points(comm, sh
     result = solved(comm, path, cell, material=materials, analysis={"type": "conductivity"})
     error = result.effective_conductivity[0, 0] - np.sqrt(10.0)
     assert 4.0 < error / result.mesh_error.effective_conductivity[0, 0] < 20.0
+    assert not result.mesh_error.effective_conductivity[2, :2].any()  # exactly zero without conductivity k13 or k23
     assert any("phases meet at points: mesh errors exceed their estimates" in line for line in result.remarks)
