@@ -44,10 +44,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
     """Yield number, content and comment of each line in a text file.
 
     Numbers begin at 1; the content is "" for lines without cells, and for a first line such as "sep=;"; the comment is
-    the text behind "#".
-
-    Raises:
-        CaseError: the file cannot be read, or is not text.
+    the text behind "#".  Raises CaseError if the file cannot be read, or is not text.
     """
     try:
         content = input_files.read(path, MAX_BYTES)
@@ -59,7 +56,10 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
         try:
             text = content.translate(UNITS_OF_EXCEL).decode()
         except UnicodeDecodeError as other:
-            raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {error.start}") from other
+            line = content.count(b"\n", 0, error.start) + 1
+            raise CaseError(f"{path.name}: expected text in UTF-8; line {line} has other bytes") from other
+    if "\0" in text:
+        raise CaseError(f"{path.name}: expected text; it has null characters, like UTF-16 without a byte order mark")
     has_begun = False
     for number, line in enumerate(text.splitlines(), 1):
         contents, _, comment = line.partition("#")
@@ -82,7 +82,7 @@ def row_fault(line: str, cells: Sequence[str], count: int) -> str:
     """Return the fault of a row: an open quotation mark, or a cell count other than `count`; else an empty string."""
     if line.count('"') % 2:
         return "a quotation mark is not closed"
-    return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, one for each name"
+    return "" if len(cells) == count else f"expected {count} columns, one for each name; it has {len(cells)}"
 
 
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"

@@ -39,7 +39,7 @@ def test_faults_are_reported_once_and_nothing_is_written(tmp_path):
     (tmp_path / "case.toml").write_text(BASE.replace(HEXAGONAL, TABLE))
     job = command_line(2, "fibres", tmp_path / "case.toml", "--out", tmp_path / "out.csv")
     faults = [
-        "error: [cell] square.csv: row 3: has 2 columns; expected 3, one for each name",
+        "error: [cell] square.csv: row 3: expected 3 columns, one for each name; it has 2",
         "error: [cell] square.csv: row 2: radius = -3.0: expected a number above 0",
     ]
     assert (job.returncode, job.stdout) == (2, "") and not (tmp_path / "out.csv").exists()

@@ -18,7 +18,7 @@ TABLES: dict[str, tuple[Content, str]] = {
     "a link in a circle": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
     "sparse": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 64 MiB"),
     "empty": ("", "no rows"),
-    "zeros": (b"\0" * 10000, "expected names of columns"),
+    "zeros": (b"\0" * 10000, "null characters"),
     "an image": (b"\x89PNG\r\n\x1a\n\xff" * 100, "expected text in UTF-8"),
     "names alone": (HEAD, "no fibres"),
     "one line of a megabyte": (HEAD + "1," * 500_000, "has 500001 columns"),

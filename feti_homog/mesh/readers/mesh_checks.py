@@ -222,8 +222,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
         places = plane[nodes] + shift[:2]
         advice = _nearest(plane, places[gap > same], plane[cKDTree(places).query(plane)[0] > same])
         if len(nodes) > len(partners) and "snap" not in advice:
-            counts = f"{len(partners)} nodes face {len(nodes)}"
-            advice = f"; {counts}: mesh both sides with {len(nodes)} (gmsh: Periodic Curve){advice}"
+            advice = f"; {len(partners)} nodes face {len(nodes)}: mesh both sides alike (gmsh: Periodic Curve){advice}"
         expected = [f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}" for k in nodes[gap > same]]
         faults += _listed(f"not periodic, nodes of the {NO_PARTNER[axis, side]}", expected, str, advice)
     # An element between bare sides would be its own neighbour.

@@ -96,8 +96,8 @@ def mesh_of(grid: Grid) -> RawMesh:
     only = [k for k in whole if data[k].dtype.kind in "iu"] or whole
     name = next((name for name in (PHASE, *NUMBERS) if name in data), only[0] if len(only) == 1 else "")
     if not name:
-        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
-        faults.append(f"no cell data named {PHASE}, but {', '.join(data) or 'none'}: {expected}")
+        expected = "expected whole numbers, 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
+        faults.append(f"no cell data named {PHASE}, the file has {', '.join(data) or 'none'}: {expected}")
     elif np.size(data[name]) != len(types):
         faults.append(f"cell data {name}: expected one value for each of {len(types)} cells")
     else:

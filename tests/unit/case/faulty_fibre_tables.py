@@ -22,9 +22,9 @@ FAULTY_TABLES = {
         "t.csv: row 2: lengths in cm and mm: expected one unit",
     ),
     "column twice": ("x,y,radius,X\n1,2,3,4\n", "t.csv: row 1: column x: the name is there twice"),
-    "too short a row": (HEAD + ROW + "1,2\n", "t.csv: row 3: has 2 columns; expected 3, one for each name"),
-    "too long a row": (HEAD + "1,2,3,4\n", "t.csv: row 2: has 4 columns; expected 3, one for each name"),
-    "decimal commas": (HEAD + "1,5,2,5,0,5\n", "t.csv: row 2: has 6 columns; expected 3, one for each name"),
+    "too short a row": (HEAD + ROW + "1,2\n", "t.csv: row 3: expected 3 columns, one for each name; it has 2"),
+    "too long a row": (HEAD + "1,2,3,4\n", "t.csv: row 2: expected 3 columns, one for each name; it has 4"),
+    "decimal commas": (HEAD + "1,5,2,5,0,5\n", "t.csv: row 2: expected 3 columns, one for each name; it has 6"),
     "no number": (HEAD + "# comment\n\n1,here,3\n", 't.csv: row 4: y = "here": expected a number'),
     "a number with words": (HEAD + "1,2,3 um\n", 't.csv: row 2: radius = "3 um": expected a number above 0'),
     "not finite": (HEAD + "nan,2,3\n", 't.csv: row 2: x = "nan": expected a number'),
@@ -49,5 +49,9 @@ FAULTY_TABLES = {
     "too large a width": ("# width = 1e300\n" + HEAD + ROW, "t.csv: row 1: width = 1e300: expected a number above 0"),
     "no width": ("# width = wide\n" + HEAD + ROW, "t.csv: row 1: width = wide: expected a number above 0"),
     "two widths": ("# width = 3\n# width = 4\n" + HEAD + ROW, "t.csv: row 2: width = 4: an earlier line has 3"),
-    "no text": (b"x,y,radius\n1,2,\xff\n", "t.csv: expected text in UTF-8; it has other bytes at 15"),
+    "null characters": (
+        "x,y,radius\n1,2,3\n".encode("utf-16-le"),
+        "t.csv: expected text; it has null characters, like",
+    ),
+    "no text": (b"x,y,radius\n1,2,\xff\n", "t.csv: expected text in UTF-8; line 2 has other bytes"),
 }

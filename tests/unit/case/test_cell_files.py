@@ -36,7 +36,7 @@ def test_the_case_or_the_table_gives_the_size(tmp_path):
     [
         ("width = 4", TABLE, r"\[cell\] height: missing; t.csv has no line such as # width = 120, height = 80"),
         ("width = 5\nheight = 3", "# width = 4\n" + TABLE, r"\[cell\] width = 5: t.csv says 4; give one"),
-        ("width = 4\nheight = 3", TABLE + "1,2\n", r"\[cell\] t.csv: row 3: has 2 columns"),
+        ("width = 4\nheight = 3", TABLE + "1,2\n", r"\[cell\] t.csv: row 3: expected 3 columns"),
     ],
 )
 def test_faults_of_sizes_and_rows(keys, table, line, tmp_path):

@@ -234,7 +234,7 @@ FAULTY_MESHES: list[tuple[str, MshFile | str | Callable[[Path], object]]] = [
     ("overlapping elements", turned(grid().without(12).with_element(77, 2, 1, (13, 7, 9)), 77)),
     ("hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)", _hanging()),
     ("hanging nodes: node 99", _hanging(1e-4)),
-    ("node 15 (1, 0.5), expected at (0, 0.5); 4 nodes face 5: mesh both sides with 5", grid().moved(n11=(0.1, 0.5))),
+    ("node 15 (1, 0.5), expected at (0, 0.5); 4 nodes face 5: mesh both sides alike", grid().moved(n11=(0.1, 0.5))),
     ("no node at the corner (1, 1) of the cell; the nearest nodes are up to 0.25 away; if a hole is there, shift",
      grid().without(31, 32)),
     ("all nodes have y = 0: expected a mesh in the plane x, y",

@@ -1,5 +1,7 @@
 """Quadrilaterals cut in triangles: one diagonal everywhere couples stretch and shear, alternate ones hardly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -8,6 +10,7 @@ from support.other_formats import written
 from support.pixel_images import quadrilaterals
 
 from feti_homog import run
+from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.readers.raw_mesh import in_triangles
 
 # Rows of 24 pixels from below, and C13, C23 of these squares: by another program with 8 x 8 squares a pixel, within
@@ -38,6 +41,18 @@ def test_a_mirrored_image_has_no_coupling(tmp_path):
     half = np.random.default_rng(1).random((8, 4)) < 0.4
     stiffness = solved(np.hstack([half, half[:, ::-1]]).astype(int), tmp_path / "a.inp").effective_stiffness
     assert np.abs(stiffness[:2, 2]).max() < 1e-12 * stiffness[0, 0]
+
+
+@pytest.mark.parametrize("suffix", [".inp", ".vtu", ".msh"])
+def test_a_quadrilateral_with_a_repeated_corner_is_a_triangle(tmp_path, suffix):
+    """Two such quadrilaterals in place of one, along the diagonal that cuts the one."""
+    mesh = quadrilaterals(np.pad(np.ones((2, 2), int), 1))
+    number, (kind, phase, curve, (a, b, c, d)) = next((k, e) for k, e in mesh.elements.items() if len(e[3]) == 4)
+    expected = read(written(mesh, tmp_path / f"a{suffix}"))
+    more = max(mesh.elements) + 1
+    halves = {number: (kind, phase, curve, (a, b, c, c)), more: (kind, phase, curve, (a, c, d, d))}
+    found = read(written(replace(mesh, elements=mesh.elements | halves), tmp_path / f"b{suffix}"))
+    assert len(found.triangles) == len(expected.triangles) and np.array_equal(found.points, expected.points)
 
 
 def grid(columns: int, rows: int, shear: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

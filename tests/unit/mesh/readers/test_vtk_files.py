@@ -160,8 +160,8 @@ def test_empty_sections_of_netgen_are_none(tmp_path):
 FAULTS = [
     ("not XML: syntax error: line 1, column 0", "a.vtu", "hello"),
     ("cannot be read", "a.vtk", lambda path: path),
-    ("no cell data named phase, but density: expected 0 in", "a.vtu", _vtk(HALVES, density=[1.0, 2.5])),
-    ("no cell data named phase, but a, b: expected 0 in", "a.vtu", _vtk(HALVES, a=[1.0, 2.0], b=[1.0, 1.0])),
+    ("no cell data named phase, the file has density: expected whole", "a.vtu", _vtk(HALVES, density=[1.0, 2.5])),
+    ("no cell data named phase, the file has a, b: expected", "a.vtu", _vtk(HALVES, a=[1.0, 2.0], b=[1.0, 1.0])),
     *((f"cell data phase = {value:g}: expected 0, 1, 2", "a.vtu", _vtk(HALVES, phase=[0.0, value]))
       for value in (-1.0, 1e18, 1e30, float("inf"), float("nan"))),
     ("cell 0 has the node 9: expected 0 to 3", "a.vtu", _vtk({"triangle": [[0, 1, 9]]}, phase=[0])),
