@@ -63,8 +63,8 @@ def tip_rates(context: AnalysisContext, responses: Mapping[str, Sequence[averagi
     table["interface"] = _sections(context.cell, table["interface"])
     table["G_III"] = table["G_III"] if context.cell.axial else None
     status, faces, cell = next(iter(responses.values()))[0].state.status, context.fibre_interfaces, context.cell.summary
-    others = np.flatnonzero((faces.length(status != BONDED) > 0.0) & np.isnan(cell.radii[cell.fibre_bodies])) + 1
-    if numbers := ", ".join(map(str, np.setdiff1d(others, faces.loose(status)))):
+    fibres = np.flatnonzero((faces.length(status != BONDED) > 0.0) & np.isnan(cell.radii[cell.fibre_bodies])) + 1
+    if numbers := ", ".join(map(str, np.setdiff1d(fibres, faces.loose(status)))):
         context.notes.append(f"[interface] fibre {numbers}: no energy release rates at tips, which only circles have")
     return TipRates(**table)
 

@@ -56,8 +56,8 @@ def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
         try:
             text = content.translate(UNITS_OF_EXCEL).decode()
         except UnicodeDecodeError as other:
-            line = content.count(b"\n", 0, error.start) + 1
-            raise CaseError(f"{path.name}: expected text in UTF-8; line {line} has other bytes") from other
+            row = content.count(b"\n", 0, error.start) + 1
+            raise CaseError(f"{path.name}: expected text in UTF-8; line {row} has other bytes") from other
     if "\0" in text:
         raise CaseError(f"{path.name}: expected text; it has null characters, like UTF-16 without a byte order mark")
     has_begun = False

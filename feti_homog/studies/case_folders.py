@@ -73,12 +73,16 @@ def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str)
     """Refuse a folder that holds another study, or foreign files.  On one rank.
 
     Raises CaseError for the document of a study, and for a non-empty file or subfolder with a name that matches
-    `entries`; OSError if the folder cannot be read.  `kind` names the new study in the message.
+    `entries`, unless a subfolder is a sweep; OSError if the folder cannot be read.  `kind` names the new study in the
+    message.  A study without its document finds its sweeps, which compare the cases.
     """
-    for path in sorted(directory.iterdir()):
+    paths = sorted(directory.iterdir())
+    for path in paths:
         if path.name in output_folder.STUDIES:
             raise CaseError(f"--out {directory} holds another study, whose file is {path.name}; choose another folder")
-        if entries.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
+    files = [path for path in paths if entries.fullmatch(path.name)]
+    for path in files if not any((path / INDEX_FILE).exists() for path in files) else ():
+        if any(path.iterdir()) if path.is_dir() else path.lstat().st_size:
             raise output_folder.foreign(directory, path.name, kind)
 
 

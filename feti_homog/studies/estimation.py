@@ -6,6 +6,8 @@ r_i = (f_i(x) - y_i) / s_i and J = dr/dx the estimate minimizes r^T r within bou
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -154,8 +156,8 @@ def with_ranges(
     """Replace derivatives that mispredict the range of an unknown by secants of this range; see `estimate`.
 
     In the range, between bounds, r^T r is at most its minimum plus the square of the quantile of CONFIDENCE, while the
-    other unknowns stay; the longer side counts.  Where values jump, derivatives know nothing about the range.
-    `residuals` is inf without values.
+    other unknowns stay; the longer side counts.  Where values jump, derivatives know nothing about the range, and parts
+    of the range may lie apart.  `residuals` is inf without values.
     """
     x, J, tiny = estimates.x, estimates.jacobian.copy(), float(np.finfo(float).tiny)
     limit = estimates.residuals @ estimates.residuals + QUANTILE**2
@@ -167,23 +169,32 @@ def with_ranges(
         r = moved(k, step)
         return bool(r @ r <= limit)
 
-    for k, size in enumerate(_sizes(x)):
-        slope, ends, widths = max(float(np.linalg.norm(J[:, k])), tiny), list[Float](), list[float]()
-        for side, most in ((-1, x[k] - bounds[0][k]), (1, bounds[1][k] - x[k])):
-            inside, outside = 0.0, min(QUANTILE / slope / np.sqrt(2.0), most)
-            while is_within(k, side * outside) and inside < most:
-                inside, outside = outside, min(2.0 * outside, most)
-            while inside < outside / 2 and outside > STEP * size:
-                middle = (inside + outside) / 2
-                inside, outside = (middle, outside) if is_within(k, side * middle) else (inside, middle)
-            end = moved(k, side * outside)
-            ends.append(end if np.isfinite(end).all() else moved(k, side * inside))
-            widths += [(inside + outside) / 2] if inside < outside else []
-        if not widths:  # the range has no end
-            J[:, k] = 0.0
-        elif not 0.8 < max(widths) * slope / QUANTILE < 1.25:  # more than the steps in search of the ends
-            secant = ends[1] - ends[0]
-            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * QUANTILE / max(widths)
+    def end(k: int, side: int, step: float, ratio: float) -> tuple[float, float]:
+        """Return a step within the range and one beyond, at most 1 / `ratio` times as long; the same at a bound."""
+        most = bounds[1][k] - x[k] if side > 0 else x[k] - bounds[0][k]
+        inside, outside = 0.0, min(step, most)
+        while inside < most and is_within(k, side * outside):
+            inside, outside = outside, min(2.0 * outside, most)
+        for farther in outside * 2.0 ** np.arange(1, 5) if ratio > 0.5 else ():
+            if farther < most and is_within(k, side * farther):
+                inside, outside = farther, min(2.0 * farther, most)
+        while inside < ratio * outside and outside > STEP * _sizes(x)[k]:
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if is_within(k, side * middle) else (inside, middle)
+        return side * inside, side * outside
+
+    for k in range(len(x)):
+        step = QUANTILE / max(float(np.linalg.norm(J[:, k])), tiny)
+        for ratio in (0.5, 0.9):
+            ends = [end(k, side, step / np.sqrt(2.0), ratio) for side in (-1, 1)]
+            ranges = [np.abs(pair) for pair in ends if pair[0] != pair[1]]
+            inside, width = max(ranges, key=itemgetter(1), default=(0.0, np.inf))
+            if inside <= step <= width < np.inf:
+                break
+        else:
+            low, high = (next(r for r in map(partial(moved, k), pair[::-1]) if np.isfinite(r).all()) for pair in ends)
+            secant = high - low
+            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * QUANTILE / width  # 0 without an end
     ranged = summarize(x, estimates.computed, measured, J * measured[1][:, None], bounds)
     return replace(ranged, evaluations=estimates.evaluations, converged=estimates.converged)
 

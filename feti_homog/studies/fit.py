@@ -184,17 +184,22 @@ class Evaluations:
         def squares(x: Float | Point) -> float:
             return float(np.square(residuals(x)).sum())
 
+        def better(estimates: estimation.ParameterEstimates) -> Point | None:
+            best = min(self.computed, key=squares)
+            limit = (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals)
+            return best if squares(best) < limit else None
+
+        def search(x: Float | Point) -> estimation.ParameterEstimates:
+            estimates = estimation.estimate(self.values, self.jacobian, (y, std), np.array(x), (low, high))
+            best = better(estimates)
+            return replace(estimates, evaluations=len(self.answers)) if best is None else search(best)
+
         def finished(estimates: estimation.ParameterEstimates) -> estimation.ParameterEstimates:
             if estimates.misfits or all(datum.strain is None for datum in self.fit.data):
                 return estimates
             ranged = estimation.with_ranges(estimates, residuals, (y, std), (low, high))
-            return replace(ranged, evaluations=len(self.answers))
-
-        def search(x: Float) -> estimation.ParameterEstimates:
-            estimates = estimation.estimate(self.values, self.jacobian, (y, std), x, (low, high))
-            best = min(self.computed, key=squares)
-            is_best = squares(best) >= (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals)
-            return replace(estimates, evaluations=len(self.answers)) if is_best else search(np.array(best))
+            best = better(estimates)  # behind a step of the curve
+            return replace(ranged, evaluations=len(self.answers)) if best is None else finished(search(best))
 
         with suppress(CaseError):
             estimates = search(start)
@@ -206,10 +211,10 @@ class Evaluations:
         for point in sampled_points(box, sections.SweepSection(samples=STARTS - 1)):
             squares(np.array([*point.values()]))
         # Without any sound point the search has the fault of the start again.
-        estimates = search(np.array(min(self.computed, key=squares, default=start)))
+        estimates = search(min(self.computed, key=squares, default=tuple(start)))
         if estimates.misfits:
             estimation.descend(squares, start, (low, high))
-            estimates = search(np.array(min(self.computed, key=squares)))
+            estimates = search(min(self.computed, key=squares))
         return finished(estimates)
 
     def values(self, x: Float) -> Float:

@@ -85,6 +85,7 @@ def _curve_faults(case: Case, points: Sequence[Datum]) -> Iterator[str]:
     if unknown or not (is_strain or len(loads) == 1):
         return
     rising, _, end = max(loads, key=lambda load: abs(load[2]))
+    yield from [f"{name} is prescribed as 0" for name in {datum.name for datum in points} if target.get(name) == 0.0]
     if not is_strain and target.get(load_sections.TEMPERATURE):
         end = 0.0  # a temperature may reverse the sign of the strain
     values = np.array([datum.strain or 0.0 for datum in points])

@@ -56,6 +56,9 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     found = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
     assert results.items() <= found.items() and len(found) == document["evaluations"]
     assert document["status"] == "done" and not (out / "result.lock").exists()
+    (out / "fit.json").unlink()  # the evaluations stay
+    assert in_process(*words).returncode == 0 and json.loads((out / "fit.json").read_text()) == document
+    assert found == {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
 
 
 @pytest.mark.parametrize(("kind", "first"), [("fit", "sweep"), ("fit", "fit"), ("uncertainty", "sweep")])

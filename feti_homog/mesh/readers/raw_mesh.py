@@ -151,8 +151,8 @@ def assembled(
     if quads:
         numbers, corners, group = (np.concatenate(parts) for parts in zip(*quads, strict=True))
         halves = tags[in_triangles(np.searchsorted(tags, corners), points)].reshape(-1, 3)
-        whole = (halves != np.roll(halves, 1, axis=1)).all(axis=1)  # a repeated corner makes a triangle
-        triangles.append((numbers.repeat(2)[whole], halves[whole], group.repeat(2)[whole]))
+        is_triangle = (halves != np.roll(halves, 1, axis=1)).all(axis=1)  # a repeated corner makes a triangle
+        triangles.append((numbers.repeat(2)[is_triangle], halves[is_triangle], group.repeat(2)[is_triangle]))
     numbers, corners, group = (np.concatenate(parts) for parts in zip(*triangles, strict=True))
     used, inner = np.unique(corners, return_inverse=True)
     middle = np.concatenate(middles)

@@ -65,13 +65,13 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
             text += f"; {title.replace('_', ' ')}{within}{_landmark(document, peak, title)}"
     stresses = path_curves.table_of(document["path"])[peak["stress_name"]]
     if "event_left" in peak:
-        left, lost = peak["event_left"], 1.0 - peak["stress_left"] / peak["stress"]
-        is_rising = noun == "event" and leg_of[left] == 1
+        valley, lost = peak["event_left"], 1.0 - peak["stress_left"] / peak["stress"]
+        is_rising = noun == "event" and leg_of[valley] == 1
         is_given = path_curves.targets(document)[0].get(peak["stress_name"])
         way = "along all equilibria" if is_given else f"as the {path_curves.what_rises(document)} rises"
         rises = f" {way}" if is_rising else ""
-        before = "before " if abs(peak["stress_left"] - stresses[left]) > path_curves.noise(document) else ""
-        text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({before}{noun} {left})"
+        before = "before " if abs(peak["stress_left"] - stresses[valley]) > path_curves.noise(document) else ""
+        text += f"; then falls by {lost:.1%} to {peak['stress_left']:.6g}{rises} ({before}{noun} {valley})"
     later = event + int((stresses[event:] * np.sign(peak.get("stress", 1.0))).argmax())
     if later > event and abs(stresses[later]) > (1.0 + path_curves.ZERO) * abs(peak["stress"]):
         text += f"; later {stresses[later]:.6g} ({noun} {later})"

@@ -116,6 +116,7 @@ def test_the_load_of_a_test_replaces_the_load_of_the_case():
          "[measured] curve: expected strains of the sign of the path, which ends at 0.1"),
         ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.0999, 2.0\n-0.1, 2.0\n-0.08, 1.5\n0.0, 0.0\n",
          "[measured] curve: expected strains that rise, without unloading from 0.1 to 0"),
+        ("to = {E11 = 0.1}", "E11, S22\n0.01, 1.0\n", "[measured] curve: S22 is prescribed as 0"),
         ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.11, 2.0\n",
          "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
         ("strain = [0.1, 0.0, 0.0]", "E11, S11\n10.0, 1.0\n",

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from feti_homog.case.sections import Unknown
 from feti_homog.studies import estimation
-from feti_homog.studies.estimation import estimate, names_of
+from feti_homog.studies.estimation import estimate, names_of, summarize, with_ranges
 from feti_homog.studies.fit import DIFFERENCE, Evaluations
 from feti_homog.studies.predictions import Datum
 from feti_homog.studies.study import Evaluator
@@ -215,3 +215,18 @@ def test_an_unknown_that_no_step_moves_has_neither_interval_nor_noise():
     assert found.std[0] == np.inf and {(24.0,), (36.0,)} <= cases.answers.keys()
     line = "[unknown] a: no measured value depends on it"
     assert estimation.fit_document(cases.fit.unknowns, DATA, found)["faults"] == [line]
+
+
+def test_a_range_reaches_over_a_step_of_the_curve_to_its_farther_part():
+    """Within the limit from 50 to 54, and again from 58 to 62; the derivative predicts 52 +- 0.2."""
+
+    def residuals(x):
+        return np.array([0.0 if 50.0 <= x[0] <= 54.0 else 1.0 if 58.0 <= x[0] <= 62.0 else 9.0 + x[0]])
+
+    measured, bounds = (np.zeros(1), np.ones(1)), (np.array([1.0]), np.array([200.0]))
+    estimates = summarize(np.array([52.0]), np.zeros(1), measured, np.array([[10.0]]), bounds)
+    assert estimates.half_width == pytest.approx([0.196], rel=1e-3)
+    assert 10.0 <= with_ranges(estimates, residuals, measured, bounds).half_width[0] <= 10.0 / 0.9
+    # The end of a range that is one piece has an error of at most a tenth, on the safe side.
+    near = with_ranges(estimates, lambda x: residuals(np.minimum(x, 57.0)), measured, bounds)
+    assert 2.0 <= near.half_width[0] <= 2.0 / 0.9
