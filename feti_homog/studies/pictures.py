@@ -198,7 +198,7 @@ def fit_figure(document: Mapping[str, Any], results: Sequence[Document] = ()) ->
     stress = results[0]["case"].get("output", {}).get("stress_unit", "") if results else ""
     title = f"{document['name']}: computed and measured{', not converged' if document.get('faults') else ''}"
     for name, number in document.get("unknowns", {}).items():
-        deviation = f" ± {number['std']:.2g} (std)" if number["std"] else ""
+        deviation = f" ± {number['std']:.2g} (std)" if number["std"] and not document.get("faults") else ""
         title += f"\n{tables.with_unit(name, stress)} = {number['estimate']:.5g}{deviation}"
     figure.suptitle(plot_helpers.plain(title))
     return figure

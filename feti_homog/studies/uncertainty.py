@@ -87,11 +87,12 @@ class ScatterStudy(Study):
         data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
         values, mesh_errors = _values(means, data), [constant_tables.mesh_errors(document) for document in means]
         sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
-        slopes = np.zeros((count, len(data), len(uncertainty.std)))
+        slopes, bends = np.zeros((count, len(data), len(uncertainty.std))), np.zeros((len(data), len(uncertainty.std)))
         for k, (name, std) in enumerate(uncertainty.std.items()):
             if name in inexact:
                 below, above = np.moveaxis(sides[:, inexact.index(name)], 1, 0)
                 slopes[:, :, k] = (above - below) / (2 * std)
+                bends[:, k] = ((above + below) / 2 - values).mean(axis=0)
             else:
                 slopes[:, :, k] = [exact_derivatives(document, data, name) for document in means]
         J = slopes.mean(axis=0)
@@ -119,7 +120,7 @@ class ScatterStudy(Study):
                  "std_cells": float(of_cells[k]) if count > 1 else None,
                  "std": float(np.hypot(deviations[k], of_cells[k])), "mesh_error": mean_error(datum.name),
                  "derivatives": J[k].tolist(), "derivative_errors": None if errors is None else errors[k].tolist(),
-                 "shares": shares[k].tolist()}
+                 "bends": bends[k].tolist(), "shares": shares[k].tolist()}
                 for k, datum in enumerate(data)
             ],
         }  # fmt: skip

@@ -50,6 +50,8 @@ def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path, temperatu
         assert (terms[-1] == pytest.approx(each["value"], rel=1e-3)) == is_closed
         assert abs(terms.sum()) < 1e-3 * each["value"]
         assert each["std_inputs"] == pytest.approx(np.linalg.norm(terms * ([0.01] * 4 + [0.1])))
+        # A load is a rational function of stiffnesses: its second difference is of second order in their scatter.
+        assert 0.0 < np.abs(each["bends"]).max() < 1e-3 * abs(each["value"]) and each["bends"][-1] < 1e-9
     stamps = {path: path.stat().st_mtime_ns for path in shared_path.glob("out/*/case-*/result.json")}
     assert len(stamps) == (9 if is_closed else 11)
     assert study.run(shared_path / "out", comm, comm.size, False, True) == found

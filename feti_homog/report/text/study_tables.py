@@ -90,6 +90,8 @@ def scatter_text(document: Document) -> str:
         lines.append("+- mesh: for stiffnesses, constants, conductivities alone, with [output] mesh_error = true")
     several = [result for result in results if result["derivative_errors"]]
     for k, number in enumerate(inputs):
+        if bent := ", ".join(r["name"] for r in results if abs(r["bends"][k]) > r["std_inputs"] / 4):
+            lines.append(f"Not linear within one standard deviation of {number['name']}: {bent}")
         noisy = ", ".join(r["name"] for r in several if 2 * r["derivative_errors"][k] > abs(r["derivatives"][k]))
         if noisy:
             lines.append(f"Standard error over the cells above half of the slope by {number['name']}: {noisy}")

@@ -18,6 +18,7 @@ def test_stresses_have_their_unit_and_strains_none():
         "std": 3.0,
         "shares": [1.0],
         "derivative_errors": None,
+        "bends": [0.0],
     }
     document = {
         "stress_unit": "MPa", "cells": 1, "parameters": [{"name": "material.matrix.young", "by": "differences"}],
@@ -26,6 +27,7 @@ def test_stresses_have_their_unit_and_strains_none():
     text = scatter_text(document)
     rows = [line.split("  ")[1] for line in text.splitlines() if " 30 " in line]
     assert rows == ["onset_S11 (MPa)", "peak_E11", "E_axial (MPa)"] and "Negative shares" not in text
+    assert "Not linear" not in text
     del document["stress_unit"]  # as files of earlier versions
     assert "onset_S11  " in scatter_text(document)
 
@@ -43,7 +45,7 @@ def test_every_number_stands_under_its_head():
         "stress_unit": "GPa", "cells": 3,
         "parameters": [{"name": names[0], "by": "derivatives"}, {"name": names[1], "by": "differences"}],
         "results": [
-            row | {"shares": own, "derivatives": [1.0, -2.0], "derivative_errors": errors}
+            row | {"shares": own, "derivatives": [1.0, -2.0], "derivative_errors": errors, "bends": [0.0, 0.76]}
             for row, own, errors in zip(rows, shares, ([0.4, 1.1], [0.6, 0.9], [9.0, 9.0]), strict=True)
         ],
     }  # fmt: skip
@@ -59,7 +61,8 @@ def test_every_number_stands_under_its_head():
     words = "Standard error over the cells above half of the slope by"
     assert lines[6] == "Negative shares: correlated numbers act against each other"
     assert lines[7].startswith("+- mesh: for stiffnesses, constants, conductivities alone")
-    assert lines[8:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]
+    bent = f"Not linear within one standard deviation of {names[1]}: C11, nu12"
+    assert lines[8:] == [f"{words} {names[0]}: nu12", bent, f"{words} {names[1]}: C11"]
     document["results"][1]["mesh_error"] = 0.01
     assert "+- mesh: for" not in scatter_text(document)
 
@@ -89,6 +92,7 @@ def test_all_secants_in_space_are_listed():
         "std": 0.3,
         "shares": [1.0],
         "derivative_errors": None,
+        "bends": [0.0],
     }
     results = [scatter | {"name": name} for name in SECANTS]
     parameters = [{"name": "material.fibre.E_axial", "by": "derivatives"}]
