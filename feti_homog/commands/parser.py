@@ -53,7 +53,8 @@ class Parser(argparse.ArgumentParser):
     """A command-line parser that raises CaseError for faulty arguments."""
 
     def error(self, message: str) -> NoReturn:
-        raise CaseError(f"command line: {message} (see --help)")
+        hint = "; without it, the same command resumes" if message == "unrecognized arguments: --resume" else ""
+        raise CaseError(f"command line: {message}{hint} (see --help)")
 
 
 def command_parser() -> Parser:

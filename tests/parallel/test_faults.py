@@ -88,6 +88,7 @@ def test_there_are_enough_faults():
         (["run", "none.toml"], "the following arguments are required: --out"),
         (["run", "none.toml", "--out", "results/none"], "none.toml: cannot be read: No such file"),
         (["run", "none.toml", "--out", "results/none", "--quite"], "unrecognized arguments: --quite"),
+        (["fit", "none.toml", "--out", "results/none", "--resume"], "--resume; without it, the same command resumes"),
         (["check", "."], "cannot be read: Is a directory"),
     ],
 )
