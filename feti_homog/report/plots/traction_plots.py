@@ -138,7 +138,7 @@ def _panel(axes: Axes, states: list[Any], quantity: str, place: Coordinate) -> N
         values = values.reshape(len(values), -1)[place.nodes]
         at, turn = place.values, place.ends[1] - place.ends[0]
         # The curve closes if the gap between the last and the first node is less than twice the largest other gap.
-        if place.is_direction and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
+        if place.is_closed and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
             at = np.concatenate([at[-1:] - turn, at, at[:1] + turn])
             values = np.concatenate([values[-1:], values, values[:1]])
         is_last = state is states[-1]
@@ -160,6 +160,7 @@ class Coordinate:
     ends: tuple[float, float]
     label: str
     is_direction: bool
+    is_closed: bool = True
 
 
 def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
@@ -194,9 +195,10 @@ def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     best = np.arange(len(nodes)), (distance + SAME_PLACE * length * fraction).argmin(axis=1)
     at = before[nearest[best]] + (fraction * length)[best]
     order, unit = np.argsort(at, kind="stable"), plot_helpers.unit_label(file.attrs["length_unit"])
-    origin = " from normal $x_1$" if all(line[0] == line[-1] for line in lines) else ""
-    label = f"arc length{origin}, counterclockwise {unit or '(cell units)'}"
-    return Coordinate(of_body[order], at[order], (0.0, float(before[-1])), label, False)
+    is_closed = all(line[0] == line[-1] for line in lines)
+    label = f"arc length{' from normal $x_1$' if is_closed else ''}, counterclockwise {unit or '(cell units)'}"
+    ends = 0.0, float(before[-1])
+    return Coordinate(of_body[order], at[order], ends, label, False, is_closed and len(lines) == 1)
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:

@@ -12,7 +12,7 @@ from support.sample_output import Sample, sample, write
 
 from feti_homog.report.plots.cell_picture import write_fibre_numbers
 from feti_homog.report.plots.drawn_cell import DrawnCell
-from feti_homog.report.plots.traction_plots import Coordinate, _limit, coordinate
+from feti_homog.report.plots.traction_plots import Coordinate, _limit, _panel, coordinate
 
 CORNERS = np.array([[0.75, 0.25], [0.75, 0.75], [0.25, 0.75], [0.25, 0.25]])
 
@@ -58,12 +58,17 @@ def test_flat_faces_have_an_arc_length(tmp_path: Path, limit: int) -> None:
     x, y = along.T
     assert (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() > 0.0
     assert along[0, 0] == pytest.approx(0.75)
+    axes = Figure().subplots()
+    values = {"status": np.zeros(points.shape[0], int), "damage": np.arange(points.shape[0])}
+    _panel(axes, [values], "damage", place)
+    x, y = axes.lines[0].get_data()
+    assert x[-1] == place.ends[1] and y[-1] == values["damage"][place.nodes[0]]  # the curve closes
 
 
 def test_open_ends_of_an_interface_have_an_arc_length_too(tmp_path: Path) -> None:
     """Two sides of the sample's fibre are interfaces."""
     place, points = found(write(tmp_path, sample(8)), 1, 100_000)
-    assert place.label.startswith("arc length, counter")
+    assert place.label.startswith("arc length, counter") and not place.is_closed
     np.testing.assert_allclose(place.values, [0, 0.125, 0.25, 0.375, 0.5, 0.5, 0.625, 0.75, 0.875, 1.0], atol=1e-12)
     for rows in (place.nodes[:5], place.nodes[5:]):
         upper = points[rows[0], 1] > 0.5
