@@ -170,7 +170,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault that a cell is a parallelogram or a hexagon; [] for other cells."""
+    """Return the fault that a cell is a parallelogram, a turned rectangle or a hexagon; [] for other cells."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -185,6 +185,8 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
     if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:
         return []
     name = "parallelogram" if half == 2 else "hexagon"
+    if half == 2 and abs(sides[0] @ sides[1]) <= STRAIGHT * (sides[0] @ sides[0] + sides[1] @ sides[1]):
+        name = f"rectangle turned by {np.degrees(np.arctan2(sides[0, 1], sides[0, 0])) % 90.0:.3g} degrees"
     return [f'the cell is a {name}, expected a rectangle: see "Lattices that are not rectangular" in meshes/README.md']
 
 

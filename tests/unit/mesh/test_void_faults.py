@@ -103,7 +103,7 @@ CELLS = {
     "rhombus": (mapped([[1, 0.5], [0, ROOT / 2]]), "parallelogram"),
     "rhombus on its tip": (mapped([[0.5, -0.5], [0.75, 0.75]]), "parallelogram"),
     "sheared by any number": (mapped([[1, 0.2345678], [0, 0.9]]), "parallelogram"),
-    "turned": (mapped([[0.8, -0.6], [0.6, 0.8]]), "parallelogram"),
+    "turned": (mapped([[0.8, -0.6], [0.6, 0.8]]), "rectangle turned by 36.9 degrees"),
     "hexagon": (hexagon(), "hexagon"),
     "hexagon, upright": (hexagon(np.pi / 2), "hexagon"),
 }
