@@ -248,6 +248,11 @@ def fit_document(
     elif misfits:
         words = "the model does not describe the measurements, or other starts fit better"
         faults.append(f"{words} (chance {estimates.chance:.2g}): intervals fail")
+        ratio = np.median(
+            [abs(datum.value) / max(abs(f), 1e-300) for datum, f in zip(data, estimates.computed, strict=True)]
+        )
+        if not 1 / 30 < ratio < 30:
+            faults[-1] += f"; measured values are about {ratio:.0e} times the computed ones: check their unit"
     else:
         faults += names_of(estimates.undetermined, [*unknowns])
     cure = f"; {steps} makes the curve a staircase: more teeth (softening_tolerance) make it smooth" if steps else ""

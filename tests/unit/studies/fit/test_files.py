@@ -72,6 +72,10 @@ def test_residuals_that_a_correct_model_hardly_has_are_a_fault(slope, residual, 
     cure = "; teeth = 6 makes the curve a staircase: more teeth (softening_tolerance) make it smooth"
     stepped = estimation.fit_document(fit.unknowns, fit.data, estimates, "teeth = 6")
     assert stepped["faults"] == [f"{fault}{cure}" for fault in found["faults"]]
+    if slope:  # computed in GPa, measured in MPa
+        scaled = summarize(np.array([200.0]), y / 1000.0, (y, std), J, bounds)
+        (fault,) = estimation.fit_document(fit.unknowns, fit.data, scaled)["faults"]
+        assert fault.endswith("; measured values are about 1e+03 times the computed ones: check their unit")
 
 
 @pytest.mark.parametrize("steps", ["teeth = 6", "softening_tolerance = 0.5", ""])
