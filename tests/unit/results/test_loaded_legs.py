@@ -136,3 +136,12 @@ def test_tables_of_studies_have_the_temperature_at_onset_and_the_peak_of_the_loa
     for point in document["path"]:
         point["stress"] = [NOISE] * 6
     assert not {name for name in outputs(document) if name.startswith("peak_")}
+
+
+def test_compression_and_prescribed_stresses_are_no_landmarks_of_later_legs():
+    """Tension breaks a bond, a leg without breaks compresses more, and a leg ends at a prescribed S22."""
+    rows = [(0.2, 0.0, {"E11": 0.01, "S11": 30.0}, 1), (1 / 3, 0.0, {"E11": 0.02, "S11": 20.0}, 0),
+            (2 / 3, 0.0, {"E11": -0.02, "S11": -90.0}, 0),
+            (1.0, 0.0, {"E11": -0.02, "S11": -90.0, "E22": -0.05, "S22": -50.0}, 0)]  # fmt: skip
+    words = text(path([{"E11": 0.02}, {"E11": -0.02}, {"E11": -0.02, "S22": -50.0}], rows))
+    assert "Peak S11: 30 at E11 = 0.01" in words and "later" not in words and "of leg 3" not in words
