@@ -111,6 +111,11 @@ class ParameterEstimates:
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
     @property
+    def is_poor(self) -> bool:
+        """Whether `chance` is at most 1 - CONFIDENCE, so that other starts may fit better."""
+        return self.chance is not None and self.chance <= 1.0 - CONFIDENCE
+
+    @property
     def misfits(self) -> bool:
         """Whether the residuals are too large for a correct model: `chance` is below LEAST_CHANCE."""
         return self.chance is not None and self.chance < LEAST_CHANCE
@@ -175,7 +180,7 @@ def with_ranges(
         inside, outside = 0.0, min(step, most)
         while inside < most and is_within(k, side * outside):
             inside, outside = outside, min(2.0 * outside, most)
-        for farther in outside * 2.0 ** np.arange(1, 5) if ratio > 0.5 else ():
+        for farther in outside * np.sqrt(2.0) ** np.arange(1, 9) if ratio > 0.5 else ():
             if farther < most and is_within(k, side * farther):
                 inside, outside = farther, min(2.0 * farther, most)
         while inside < ratio * outside and outside > STEP * _sizes(x)[k]:
@@ -185,7 +190,7 @@ def with_ranges(
 
     for k in range(len(x)):
         step = QUANTILE / max(float(np.linalg.norm(J[:, k])), tiny)
-        for ratio in (0.5, 0.9):
+        for ratio in (0.5, 0.9)[estimates.is_poor :]:
             ends = [end(k, side, step / np.sqrt(2.0), ratio) for side in (-1, 1)]
             ranges = [np.abs(pair) for pair in ends if pair[0] != pair[1]]
             inside, width = max(ranges, key=itemgetter(1), default=(0.0, np.inf))

@@ -203,7 +203,7 @@ class Evaluations:
 
         with suppress(CaseError):
             estimates = search(start)
-        if estimates is not None and (estimates.chance is None or estimates.chance > 1.0 - estimation.CONFIDENCE):
+        if estimates is not None and not estimates.is_poor:
             return finished(estimates)
         if not self.evaluator.quiet:
             standard_streams.say("remark: a poor fit, or none, from this start; the next is the best further point:")

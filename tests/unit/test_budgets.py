@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 138,
     "results": 2430 + 227 + 30,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 74,
+    "studies": 2950 + 129 + 79,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1131
+FILES, TOTAL = 310, 45000 + 800 + 1136
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

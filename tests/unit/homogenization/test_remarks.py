@@ -171,7 +171,8 @@ def test_bonding_that_a_mesh_does_not_have_is_remarked(curve, sections, expected
     lines = describe(case, MPI.COMM_SELF).splitlines()
     found = [line.removeprefix("remark     ") for line in lines if line.startswith("remark")]
     assert len(found) == len(expected) and all(map(str.startswith, found, expected)), found
-    assert list(run(case, MPI.COMM_SELF).remarks) == found
+    rates = ["[interface] fibre 1: no energy release rates at tips, which only circles have"]  # known after the solve
+    assert list(run(case, MPI.COMM_SELF).remarks) == found + rates * (curve == "debonded" and bool(sections))
 
 
 @pytest.mark.parametrize(
