@@ -102,7 +102,7 @@ def with_ellipses(mesh: CoarseMesh, pairs: Int32, middles: MiddleNodes) -> Coars
             arcs += [pairs[edges] for _, edges in loop]
     added = _with_arcs(mesh, ellipses, arcs)
     ends, number = added.arc_edges[len(mesh.arc_edges) :], added.arc_circle[len(mesh.arc_edges) :]
-    advice = "these fibres are polygons; if they should be round, write coordinates with more digits"
+    advice = "these outlines are polygons; if they should be round, write coordinates with more digits"
     remarks = (f"nodes near circles or ellipses, but not on them: {first_of(polygons, len(polygons))}: {advice}",)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes)
     return replace(added, triangles=triangles, remarks=remarks if polygons else ())
