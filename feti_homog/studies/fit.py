@@ -184,21 +184,20 @@ class Evaluations:
         def squares(x: Float | Point) -> float:
             return float(np.square(residuals(x)).sum())
 
-        def better(estimates: estimation.ParameterEstimates) -> Point | None:
-            best = min(self.computed, key=squares)
-            limit = (1.0 - estimation.STEP) * (estimates.residuals @ estimates.residuals)
-            return best if squares(best) < limit else None
+        def better(estimates: estimation.ParameterEstimates, gain: float) -> Point | None:
+            best, total = min(self.computed, key=squares), estimates.residuals @ estimates.residuals
+            return best if squares(best) < total - max(gain, estimation.STEP * total) else None
 
         def search(x: Float | Point) -> estimation.ParameterEstimates:
             estimates = estimation.estimate(self.values, self.jacobian, (y, std), np.array(x), (low, high))
-            best = better(estimates)
+            best = better(estimates, 0.0)
             return replace(estimates, evaluations=len(self.answers)) if best is None else search(best)
 
         def finished(estimates: estimation.ParameterEstimates) -> estimation.ParameterEstimates:
             if estimates.misfits or all(datum.strain is None for datum in self.fit.data):
                 return estimates
             ranged = estimation.with_ranges(estimates, residuals, (y, std), (low, high))
-            best = better(estimates)  # behind a step of the curve
+            best = better(estimates, 0.1)  # behind a step of the curve, and not by its roughness
             return replace(ranged, evaluations=len(self.answers)) if best is None else finished(search(best))
 
         with suppress(CaseError):
