@@ -13,6 +13,7 @@ from support.verified_results import SPRINGS
 
 from feti_homog import Case, run
 from feti_homog.analysis.runner import compute
+from feti_homog.errors import ConvergenceError
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -208,3 +209,21 @@ def test_mesh_errors_exceed_their_estimates_where_phases_meet_at_points(comm, sh
     assert 4.0 < error / result.mesh_error.effective_conductivity[0, 0] < 20.0
     assert not result.mesh_error.effective_conductivity[2, :2].any()  # exactly zero without conductivity k13 or k23
     assert any("phases meet at points: mesh errors exceed their estimates" in line for line in result.remarks)
+
+
+def test_equal_bonds_break_together_at_an_increment_that_reaches_their_strength(comm, shared_path):
+    """Under S12 both interfaces of layers carry 0.02 at the step where the weaker breaks: only rounding is above."""
+    path = saved(comm, shared_path / "layers.npy", np.outer([0, 1, 1, 0, 0, 2, 2, 0], np.ones(6, np.uint8)))
+    image = {"geometry": "pixels", "file": str(path), "labels": {"0": "matrix", "1": "fibre", "2": "glass"}}
+    bonds = [
+        {"between": ["matrix", phase], "normal_strength": 1.0, "tangential_strength": strength, "friction": friction}
+        for phase, strength, friction in (("fibre", 0.01, 0.3), ("glass", 0.02, 0.6))
+    ]
+    legs = [{"S22": -0.1, "S11": 0.0, "S12": 0.0}, {"S12": 0.1}]
+    sections = {"analysis": {"type": "path", "plane": "strain"}, "interface": bonds}
+    sections["path"] = {"method": "increments", "increments": 20, "waypoints": legs}
+    moduli = {"matrix": (3.0, 0.3), "fibre": (70.0, 0.2), "glass": (20.0, 0.2)}
+    materials = {phase: {"young": young, "poisson": poisson} for phase, (young, poisson) in moduli.items()}
+    with pytest.raises(ConvergenceError) as error:
+        compute(Case.parse(RUN | {"cell": image, "material": materials} | sections), comm)
+    assert [point.broke for point in error.value.result.path if point.broke] == [12, 12]

@@ -79,7 +79,7 @@ class Leg(ABC):
         first = self._used()[0]
         while self._is_overloaded():
             used, _, worst = self._used()
-            count, _, broken = self._release(worst if worst_only else used > 1.0)
+            count, _, broken = self._release(worst if worst_only else used > 1.0 + UTILISATION_TIE)
             parted += count
             self._settle(broken)
         bonds, after = self.state.bonds, self._path_state()
