@@ -133,7 +133,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     if case.analysis.type == "envelope" and cell.order == 1:
         lines += ["[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements"]
     if cell.geometry == "random" and case.output.mesh_error and case.analysis.type not in ("load", "path", "angle"):
-        lines += ['[cell] geometry = "random": "+-" of one cell has mesh errors; its scatter: realisations in [sweep]']
+        lines += ['[cell] geometry = "random": mesh errors of this one cell; for scatter: realisations in [sweep]']
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 

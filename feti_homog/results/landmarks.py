@@ -67,7 +67,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     break or, without such a fall, to the end of the first leg with breaks: after all fibres debond, the matrix alone
     may carry more.  A fall by less than `LEAST_FALL` counts only from the largest stress; so does every fall of an
     unfinished path, and of a path whose bonds broke earlier without stress.  The entry `so_far` marks a path that is
-    unfinished, or stopped early without a fall.
+    unfinished, stopped by max_events, or ends early without a fall.
 
     On the first leg of a path of events the load only rises: where bonds break, the cell drops to the next stable
     branch.  A prescribed stress cannot fall so: the peak is then one of all equilibria.
@@ -86,18 +86,23 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     number, curve = np.arange(len(stress)), stress  # values of the leading stress, each with its point
     strains, names = voigt.voigt_names(len(points[0]["stress"]))
     given, method = path_curves.targets(document)[0].get(names[component]), document["case"]["path"]["method"]
-    may_drop = method == "events" and not given
-    if may_drop and len(points) <= path_curves.first_leg(document):  # two corners of each branch, one of the first
-        number = np.repeat(path_curves.rising_points(points), 2)[1:]
-        curve = path_curves.load_controlled(points)[1:, component]
+    if method == "events" and not given:  # two corners of each branch on the first leg, one of the first
+        on_first = path_curves.first_leg(document)
+        later = path_curves.later_corners({**document, "path": points})
+        is_point = np.isin([id(point) for point in later], [id(point) for point in points])
+        number = np.repeat(path_curves.rising_points(points[:on_first]), 2)[1:]
+        number = np.append(number, on_first + np.cumsum(is_point) - is_point).astype(int)
+        curve = path_curves.load_controlled(points[:on_first])[1:, component]
+        curve = np.append(curve, [point["stress"][component] for point in later])
+        number, curve = number[np.isfinite(curve)], curve[np.isfinite(curve)]
         curve = np.where(np.abs(curve) > path_curves.noise(document), curve, 0.0)
     size = np.abs(curve)
     if path_curves.legs(document) > 1:  # compression is no peak of an earlier tension
         size = np.clip(curve * np.sign(stress[start + np.abs(stress[start:stop]).argmax()]), 0.0, None)
-        size[:start] = 0.0
+        size[number < start] = 0.0
     share = None if "unfinished" in document or broke[:start].any() else LEAST_FALL
     top, valley = deepest_fall(size, share, np.append(0, np.cumsum(broke))[number])
-    event = int(number[size[: top + 1].argmax()])
+    event = int(number[(size >= (1.0 - path_curves.ZERO) * size[: top + 1].max()).argmax()])  # first of a plateau
     entries: dict[str, Any] = {"strain_name": strains[component], "stress_name": names[component]}
     if stresses.any():
         entries |= {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
@@ -109,7 +114,8 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
             entries |= {f"{title}_{name}": value for name, value in numbers.items()}
     if valley is not None:
         entries |= {"stress_left": float(curve[valley]), "event_left": int(number[valley])}
-    is_cut_off = valley is None and document["path"][-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
+    is_cut_off = document["path"][-1]["load_factor"] < 1.0 - path_curves.SAME_LOAD
+    is_cut_off &= valley is None or path_curves.is_stopped(document)
     if stresses.any() and (is_cut_off or "unfinished" in document):
         entries["so_far"] = True
     # The fibres and directions of the bonds follow from the states alone.

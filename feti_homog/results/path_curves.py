@@ -176,6 +176,11 @@ def ends_of_legs(document: Document) -> list[int]:
     return [int(numbers[-1]) for numbers in at_ends if len(numbers)]
 
 
+def is_stopped(document: Document) -> bool:
+    """Return whether a path is unfinished, or has as many events as the case allows."""
+    return "unfinished" in document or len(document["path"]) >= document["case"]["path"].get("max_events", np.inf)
+
+
 def is_proportional(document: Document) -> bool:
     """Return whether the response between breaks is always a ray from zero: on an event path with one leg."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1

@@ -185,7 +185,7 @@ class Evaluations:
             return float(np.square(residuals(x)).sum())
 
         def better(estimates: estimation.ParameterEstimates, gain: float) -> Point | None:
-            best, total = min(self.computed, key=squares), estimates.residuals @ estimates.residuals
+            best, total = min(self.computed, key=squares), float(np.square(estimates.residuals).sum())
             return best if squares(best) < total - max(gain, estimation.STEP * total) else None
 
         def search(x: Float | Point) -> estimation.ParameterEstimates:

@@ -115,7 +115,8 @@ def _main_curves(axes: Axes, document: Document, axis: str, style: Mapping[str, 
         thin: dict[str, Any] = {"label": f"${symbol}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         line: dict[str, Any] = {"color": ink, "linewidth": 2.0, "linestyle": _line_style(table[name], drawn)}
         from_zero = np.append(0.0, table[axis][:first]), np.append(0.0, table[name][:first])
-        axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
+        if rising is None or "friction_heat" not in points[0]:  # friction follows no snap-back
+            axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
             axes.plot(later[axis], later[name], **line)
             axes.plot(table[axis][first:], table[name][first:], "o", color=ink, ms=3.5)
@@ -155,7 +156,8 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
         if rising is None:
             axes.plot(strain, count, **line, linewidth=1.4, **way, **style)
         else:  # after a break the next branch carries the load
-            axes.plot(strain, count, color=ink, linewidth=0.6, alpha=0.5)
+            if "friction_heat" not in points[0]:
+                axes.plot(strain, count, color=ink, linewidth=0.6, alpha=0.5)
             axes.step(strain[rising], count[rising], where="pre", **line, linewidth=1.8)
     if "damaged_share" in points[0]:  # softening laws have damaged bonds that hold
         damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]

@@ -55,6 +55,10 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     curve = "the path" if leg_of[-1] == 1 else f"leg {leg_of[event]:.0f}"
     end = np.flatnonzero(leg_of == leg_of[event])[-1]
     begins = {landmarks.PEAK: f"Peak {name}", landmarks.SO_FAR: f"Largest {name} so far, the path being cut off"}
+    if peak["stress_name"] in path_curves.targets(document)[int(leg_of[event]) - 1] and not path_curves.is_stopped(
+        document
+    ):
+        begins[landmarks.SO_FAR] = f"Limit load {name}"
     begins[landmarks.LARGEST] = f"{name} at the end of {curve}, no peak yet" if event == end else f"Largest {name}"
     text = "No stress acts on the path, and there is no peak"
     if "event" in peak:
@@ -76,7 +80,9 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if later > event and abs(stresses[later]) > (1.0 + path_curves.ZERO) * abs(peak["stress"]):
         text += f"; later {stresses[later]:.6g} ({noun} {later})"
     if largest == landmarks.LARGEST and event != end:
-        text += f"; {curve} ends near its peak, {1.0 - stresses[end] / peak['stress']:.1%} below it"
+        below = 1.0 - stresses[end] / peak["stress"]
+        near = f"near its peak, {below:.1%} below it" if abs(below) > path_curves.ZERO else "at this stress"
+        text += f"; {curve} ends {near}"
     places = {"the first break": peak.get("first_break_event"), f"the {largest}": peak.get("event")}
     errors = {place: document["path"][k].get("mesh_error") for place, k in places.items() if k is not None}
     parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]

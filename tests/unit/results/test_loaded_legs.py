@@ -101,7 +101,10 @@ def test_the_component_of_the_leg_where_damage_begins_leads() -> None:
             (0.85, 0.0, {"E11": 0.005, "S11": 30.0, "gamma12": 0.03, "S12": 60.0}, 1),
             (0.9, 0.0, {"E11": 0.006, "S11": 20.0, "gamma12": 0.03, "S12": 50.0}, 1),
             (1.0, 0.0, {"E11": 0.02, "S11": 28.0, "gamma12": 0.03, "S12": 40.0}, 0)]  # fmt: skip
-    words = text(path(legs, rows))
+    document = path(legs, rows)
+    # The stress drops to 20 just after each break: the work up to the next point is that of the mean stress.
+    document["path"][4]["work"], document["path"][5]["work"] = 0.1 + 20.0 * 0.001, 0.12 + 24.0 * 0.014
+    words = text(document)
     assert "Peak S11: 30 at E11 = 0.005 (event 3); first break 30 at 0.005 (event 3); then falls by 33.3%" in words
     assert "Largest S12 of leg 3: 60 at gamma12 = 0.03 (point 2)" in words
 
@@ -145,3 +148,33 @@ def test_compression_and_prescribed_stresses_are_no_landmarks_of_later_legs():
             (1.0, 0.0, {"E11": -0.02, "S11": -90.0, "E22": -0.05, "S22": -50.0}, 0)]  # fmt: skip
     words = text(path([{"E11": 0.02}, {"E11": -0.02}, {"E11": -0.02, "S22": -50.0}], rows))
     assert "Peak S11: 30 at E11 = 0.01" in words and "later" not in words and "of leg 3" not in words
+
+
+def test_a_waypoint_on_a_straight_leg_changes_no_peak():
+    """A bar with the stiffness 1000, which breaks at 30 to 600, at 24 to 500; the state behind a break is no point."""
+    states = [(0.03, 1000.0, 1), (0.04, 600.0, 1), (0.06, 500.0, 0)]
+    found = []
+    for corners in ([0.06], [0.01, 0.06]):
+        rows, work, last = [], 0.0, (0.0, 1000.0)
+        for strain, stiffness, broke in [(0.01, 1000.0, 0)] * (len(corners) - 1) + states:
+            work += 0.5 * stiffness * (strain**2 - last[0] ** 2)
+            leg = next(k for k, corner in enumerate(corners) if strain <= corner)
+            start = corners[leg - 1] if leg else 0.0
+            load = (leg + (strain - start) / (corners[leg] - start)) / len(corners)
+            rows.append((load, 0.0, {"E11": strain, "S11": stiffness * strain}, broke, work))
+            last = strain, stiffness
+        document = path([{"E11": corner} for corner in corners], [row[:4] for row in rows])
+        for point, row in zip(document["path"], rows, strict=True):
+            point["work"] = row[4]
+        peak = peak_of(document)
+        found.append((peak["stress"], peak["stress_left"], peak["event_left"] - len(corners)))
+    assert found[0] == pytest.approx((30.0, 18.0, 0)) and found[1] == pytest.approx(found[0])
+
+
+def test_the_first_point_of_a_plateau_has_its_largest_stress():
+    """Rounding decides which of two equal stresses is larger."""
+    for more in (-1e-15, 0.0, 1e-15):
+        rows = [(0.5, 0.0, {"E11": 0.01, "S11": 30.0}, 1), (1.0, 0.0, {"E11": 0.02, "S11": 30.0 * (1.0 + more)}, 0)]
+        document = path([{"E11": 0.02}], rows)
+        document["path"][1]["work"] = 0.4
+        assert peak_of(document)["event"] == 0
