@@ -78,8 +78,7 @@ def peak_of(document: path_curves.Document) -> dict[str, Any]:
     if (damaging := path_curves.damaging_leg(document, ("broke", "softened"))) is not None:
         start, stop = int((leg < damaging).sum()), int((leg <= damaging).sum())
     component = path_curves.leading_component(document)
-    # The sum with 0.0 turns -0.0 into 0.0.
-    strain = np.array([point["strain"][component] for point in points], float) + 0.0
+    strain = np.array([point["strain"][component] for point in points], float) + 0.0  # turns -0.0 into 0.0
     stresses = path_curves.stresses(document)[: len(points)]
     stress = stresses[:, component] + 0.0
     broke = np.array([point["broke"] for point in points])

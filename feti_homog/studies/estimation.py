@@ -6,8 +6,6 @@ r_i = (f_i(x) - y_i) / s_i and J = dr/dx the estimate minimizes r^T r within bou
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -193,12 +191,12 @@ def with_ranges(
         for ratio in (0.5, 0.9)[estimates.is_poor :]:
             ends = [end(k, side, step / np.sqrt(2.0), ratio) for side in (-1, 1)]
             ranges = [np.abs(pair) for pair in ends if pair[0] != pair[1]]
-            inside, width = max(ranges, key=itemgetter(1), default=(0.0, np.inf))
+            inside, width = max(ranges, key=lambda pair: pair[1], default=(0.0, np.inf))
             if inside <= step <= width < np.inf:
                 break
         else:
-            low, high = (next(r for r in map(partial(moved, k), pair[::-1]) if np.isfinite(r).all()) for pair in ends)
-            secant = high - low
+            values = [[moved(k, way) for way in pair[::-1]] for pair in ends]
+            secant = np.subtract(*(next(r for r in pair if np.isfinite(r).all()) for pair in values[::-1]))
             J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * QUANTILE / width  # 0 without an end
     ranged = summarize(x, estimates.computed, measured, J * measured[1][:, None], bounds)
     return replace(ranged, evaluations=estimates.evaluations, converged=estimates.converged)

@@ -30,13 +30,13 @@ LINES = {
     "mesh": 5500 + 46 + 294,
     "microstructure": 2140 + 24 + 62,
     "report": 3420 + 217 + 146,
-    "results": 2430 + 227 + 41,
+    "results": 2430 + 227 + 40,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 78,
+    "studies": 2950 + 129 + 76,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1154
+FILES, TOTAL = 310, 45000 + 800 + 1151
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
