@@ -156,7 +156,7 @@ def estimate(
 def with_ranges(
     estimates: ParameterEstimates, residuals: Model, measured: tuple[Float, Float], bounds: tuple[Float, Float]
 ) -> ParameterEstimates:
-    """Replace derivatives that mispredict the range of an unknown by secants of this range; see `estimate`.
+    """Replace derivatives that mispredict values in the range of an unknown by secants; see `estimate`.
 
     In the range, between bounds, r^T r is at most its minimum plus the square of the quantile of CONFIDENCE, while the
     other unknowns stay; the longer side counts.  Where values jump, derivatives know nothing about the range, and parts
@@ -169,8 +169,7 @@ def with_ranges(
         return residuals(np.where(np.arange(len(x)) == k, x + step, x))
 
     def is_within(k: int, step: float) -> bool:
-        r = moved(k, step)
-        return bool(r @ r <= limit)
+        return bool(np.square(moved(k, step)).sum() <= limit)
 
     def end(k: int, side: int, step: float, ratio: float) -> tuple[float, float]:
         """Return a step within the range and one beyond, at most 1 / `ratio` times as long; the same at a bound."""
@@ -190,14 +189,15 @@ def with_ranges(
         step = QUANTILE / max(float(np.linalg.norm(J[:, k])), tiny)
         for ratio in (0.5, 0.9)[estimates.is_poor :]:
             ends = [end(k, side, step / np.sqrt(2.0), ratio) for side in (-1, 1)]
-            ranges = [np.abs(pair) for pair in ends if pair[0] != pair[1]]
-            inside, width = max(ranges, key=lambda pair: pair[1], default=(0.0, np.inf))
-            if inside <= step <= width < np.inf:
+            ranges = [pair for pair in ends if pair[0] != pair[1]]
+            inside, width = np.abs(max(ranges, key=lambda pair: abs(pair[1]), default=(0.0, np.inf)))
+            low, high = (next(way for way in pair[::-1] if np.isfinite(moved(k, way)).all()) for pair in ends)
+            secant = moved(k, high) - moved(k, low)
+            size = max(float(np.linalg.norm(secant)), tiny)
+            if inside <= step <= width < np.inf and np.linalg.norm(secant - J[:, k] * (high - low)) < 0.25 * size:
                 break
         else:
-            values = [[moved(k, way) for way in pair[::-1]] for pair in ends]
-            secant = np.subtract(*(next(r for r in pair if np.isfinite(r).all()) for pair in values[::-1]))
-            J[:, k] = secant / max(float(np.linalg.norm(secant)), tiny) * QUANTILE / width  # 0 without an end
+            J[:, k] = secant / size * QUANTILE / width  # 0 without an end
     ranged = summarize(x, estimates.computed, measured, J * measured[1][:, None], bounds)
     return replace(ranged, evaluations=estimates.evaluations, converged=estimates.converged)
 
