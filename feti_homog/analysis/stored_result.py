@@ -91,7 +91,8 @@ def _refuse_other(start: str, stored: Mapping[str, Any], case: Case, ranks: int,
             old, new = (wording.toml_value(of[path]) if path in of else "none" for of in (before, now))
             lines.append(f"{wording.dotted_key(path)}: {old} now {new}")
     if n_before != ranks and len(lines) == 1:
-        raise CaseError(f"--resume: {start} of a run on {n_before} ranks; go on with as many, or choose another folder")
+        way = "go on with as many (--ranks-per-case of a study), or choose another folder"
+        raise CaseError(f"--resume: {start} of a run on {n_before} ranks; {way}")
     where = ", ".join(lines) or f"the content of {case.cell.file or case.cell.match or 'result.json'}"
     raise CaseError(f"--resume: {start} of another case, which differs in {where}; choose another folder")
 

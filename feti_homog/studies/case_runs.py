@@ -74,7 +74,7 @@ def run_all(
             mpi_errors.on_root_only(comm, reset_failures)
         fault = CaseRunner(group, directory, sweep, False, quiet is not False).run_free(comm.rank < size and not quiet)
         if errors := [error for error in comm.allgather(fault) if error is not None]:
-            remark = "finished cases are kept; the same command goes on with the others"
+            remark = "finished cases are kept"
             kind = CaseError if all(isinstance(error, CaseError) for error in errors) else FetiHomogError
             raise kind(*dict.fromkeys(line for error in errors for line in error.faults), remark)
     states = mpi_errors.on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
@@ -158,16 +158,21 @@ class CaseRunner:
         """Run cases until none is left, and show the progress if `shows`.  Collective in the group.
 
         The group skips cases that others hold; in a last round it waits for their locks.  Returns the error that
-        stopped the group, or None; raises it if other ranks of the group do not report an error in time.
+        stopped the group or, at the end, the faults of begun paths; else None.  Raises the error if other ranks of the
+        group do not report an error in time.
         """
-        timeouts, count = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries)
+        timeouts, count, faults = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries), dict[str, None]()
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
         try:
             with stepped_progress.shown(progress, label) as advance:
                 while timeouts:
                     outcomes = list[Outcome]()
                     for number, entry in enumerate(self.sweep.entries, 1):
-                        outcomes.append(self.run(entry, timeouts[0], advance)[0])
+                        try:
+                            outcomes.append(self.run(entry, timeouts[0], advance)[0])
+                        except CaseError as error:  # of a begun path, which stays; the other cases go on
+                            faults |= dict.fromkeys(error.faults)
+                            outcomes.append(Outcome.FAILED_BEFORE)
                         is_known = outcomes[-1] is not Outcome.COMPUTED
                         advance(number / count, number, f"{number} of {count} cases", is_known)
                     timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
@@ -175,7 +180,7 @@ class CaseRunner:
             if not mpi_errors.others_come(self.comm, mpi_errors.ARRIVAL_TIMEOUT_S):
                 raise
             return error
-        return None
+        return CaseError(*faults) if faults else None
 
     def run(
         self,

@@ -197,7 +197,7 @@ def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
         (0, {"normal_strength": "normal_strength = 4.1"}, "differs in interface.normal_strength: 4.0 now 4.1; choose"),
         (0, {"strain": "waypoints = [[0.2, 0.0, 0.0], [0.1, 0.0, 0.05]]"}, "path.waypoints.2.2: none now 0.0, "),
         (0, {"refine": "refine = 1"}, "differs in cell.refine: 0 now 1; choose"),
-        (2, {}, "of a run on 1 ranks; go on with as many, or choose"),
+        (2, {}, "of a run on 1 ranks; go on with as many (--ranks"),
         (0, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "decomposition.subdomains: "),
     ],
 )

@@ -199,7 +199,7 @@ def test_a_sweep_on_other_ranks_leaves_the_events_of_a_begun_case(comm, shared_p
     """One line, no failure that --retry would compute again; on as many ranks as before, the path goes on."""
     if comm.size == 1:
         pytest.skip("one rank is alone")
-    document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5]}}
+    document = CASE | {"output": {"fields": False}, "sweep": {"interface.normal_strength": [4.0, 4.5, 5.0]}}
     out = shared_path / "out"
     with interrupted(of="case-0002"), pytest.raises(RuntimeError, match="interrupted"):
         run_sweep(document, out, comm)
@@ -209,9 +209,8 @@ def test_a_sweep_on_other_ranks_leaves_the_events_of_a_begun_case(comm, shared_p
         for retry in (False, True):
             with pytest.raises(CaseError, match="events of a run on 2 ranks; go on with as many"):
                 run_sweep(document, out, MPI.COMM_SELF, retry=retry)
-            assert case_runs.list_cases(sweep_cases.expand(document, Path()), out)[1].startswith(
-                "case-0002  interrupted"
-            )
+            _, begun, last = case_runs.list_cases(sweep_cases.expand(document, Path()), out)[:3]
+            assert begun.startswith("case-0002  interrupted") and last.startswith("case-0003  done")
 
     on_root(comm, refused)
     run_sweep(document, out, comm)

@@ -19,7 +19,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before, corners, curves of fits.
 LINES = {
     ".": 470 + 18 + 3,
-    "analysis": 3000 + 140 + 63,
+    "analysis": 3000 + 140 + 64,
     "case": 2880 + 36 + 130,
     "commands": 560 + 10 + 29,
     "fem": 1150 + 3 - 24,
@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 146,
     "results": 2430 + 227 + 40,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 76,
+    "studies": 2950 + 129 + 81,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1151
+FILES, TOTAL = 310, 45000 + 800 + 1157
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
