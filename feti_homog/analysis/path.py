@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -89,8 +90,8 @@ def _keep(context: AnalysisContext, number: int, event: tuple[dict[str, Any], ch
     """Write the event of point `number` to the checkpoint; prepare the remark for an interruption.  Collective."""
     context.checkpoint.write(number, *event)
     if folder := context.directory:
-        line = f"{number + 1} points are in {folder}: `plot {folder}` draws them; to go on, add --resume to `run`"
-        standard_streams.remarks[:] = [f"{line}; a study goes on by itself"]
+        line = f"{number + 1} points are in {folder}: `plot {quote(str(folder))}` draws them"
+        standard_streams.remarks[:] = [f"{line}; to go on, add --resume to `run`; a study goes on by itself"]
 
 
 def _record_checks(

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from feti_homog.case import Case
@@ -173,7 +174,8 @@ def result_folder(directory: Path) -> Path:
         return directory
     if names == ["sweep.json"]:
         expected = f"expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep"
-        raise CaseError(f"{directory}: {expected}; `feti-homog collect {directory}` makes tables of all cases")
+        way = f"`feti-homog collect {quote(str(directory))}` makes tables of all cases"
+        raise CaseError(f"{directory}: {expected}; {way}")
     names += ["fit.png"] if "fit.json" in names else []
     raise CaseError(f"{directory} has a study: see {', '.join(names)}")
 
@@ -189,7 +191,7 @@ def refuse_begun(directory: Path) -> None:
     place, resume, who = "unfinished, without a point", "", file_locks.holder(directory / LOCK)
     with contextlib.suppress(CaseError):  # no event yet, or an unreadable one, which the next run names
         place, resume = latest(directory)["unfinished"], " --resume"
-    way = f"{who} goes on with it" if who else f"go on by `feti-homog run CASE --out {directory}{resume}`"
+    way = f"{who} goes on with it" if who else f"go on by `feti-homog run CASE --out {quote(str(directory))}{resume}`"
     raise CaseError(f"{directory}: the run is {place}; {way}")
 
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from feti_homog.analysis import description, runner, stepped_progress
@@ -81,7 +82,7 @@ def run_all(
     failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
     if comm.rank == 0 and quiet is False:
         done = sum(state.status is case_folders.Status.DONE for state in states)
-        total = f"{done} of {len(states)} cases done; `feti-homog collect {directory}` makes tables of them"
+        total = f"{done} of {len(states)} cases done; `feti-homog collect {quote(str(directory))}` makes tables of them"
         standard_streams.say("\n".join([*case_folders.note_lines(sweep.entries, states), total]))
     if failed:
         if comm.rank == 0:

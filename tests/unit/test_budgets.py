@@ -19,7 +19,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before, corners, curves of fits.
 LINES = {
     ".": 470 + 18 + 3,
-    "analysis": 3000 + 140 + 64,
+    "analysis": 3000 + 140 + 65,
     "case": 2880 + 36 + 130,
     "commands": 560 + 10 + 29,
     "fem": 1150 + 3 - 24,
@@ -30,13 +30,13 @@ LINES = {
     "mesh": 5500 + 46 + 294,
     "microstructure": 2140 + 24 + 62,
     "report": 3420 + 217 + 146,
-    "results": 2430 + 227 + 40,
+    "results": 2430 + 227 + 42,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 81,
+    "studies": 2950 + 129 + 82,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1157
+FILES, TOTAL = 310, 45000 + 800 + 1161
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -112,3 +112,14 @@ def test_a_study_is_no_result(tmp_path):
     assert output_folder.result_folder(tmp_path) == tmp_path
     with pytest.raises(CaseError, match="expected the folder of a result, not a file"):
         output_folder.result_folder(tmp_path / "result.json")
+
+
+def test_commands_in_messages_quote_folders(tmp_path):
+    folder = tmp_path / "two words"
+    folder.mkdir()
+    (folder / "sweep.json").touch()
+    with pytest.raises(CaseError, match=r"`feti-homog collect '[^']*two words'` makes tables"):
+        output_folder.result_folder(folder)
+    (folder / "checkpoint").mkdir()
+    with pytest.raises(CaseError, match=r"`feti-homog run CASE --out '[^']*two words'`"):
+        output_folder.refuse_begun(folder)
