@@ -39,6 +39,7 @@ def fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.results import viewed_states
 
     directory = output_folder.result_folder(arguments.directory)
+    mpi_errors.on_root_only(comm, output_folder.refuse_begun, directory)
     mpi_errors.on_root_only(comm, stored_result.check_to_draw, directory)
     for path in mpi_errors.on_root_only(comm, viewed_states.write_vtk, directory, arguments.format) or []:
         standard_streams.say(str(path))

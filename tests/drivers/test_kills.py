@@ -32,11 +32,11 @@ def test_a_run_that_is_killed_while_it_writes_goes_on(tmp_path):
         assert (out / "result.h5").exists() == (name in ("result.json", "path.csv"))
         assert (out / "result.json").exists() == (name == "path.csv")
         if name == "result.json":
-            refused = in_process("verify", out)
             start = f"error: {out}: the run is unfinished, "
             way = f"; go on by `feti-homog run CASE --out {out} --resume`\n"
             line = rf"{re.escape(start)}{kept} points up to load [\d.]+{re.escape(way)}"
-            assert refused.returncode == 2 and re.fullmatch(line, refused.stderr)
+            for refused in (in_process(command, out) for command in ("verify", "fields")):
+                assert refused.returncode == 2 and re.fullmatch(line, refused.stderr)
     job = command_line(2, "run", case, "--out", out, "--resume")
     assert job.returncode == 0 and f"{kept} events are taken from the checkpoint" in job.stdout, job.stderr
     document = json.loads((out / "result.json").read_text())

@@ -21,7 +21,7 @@ LINES = {
     ".": 470 + 18 + 3,
     "analysis": 3000 + 140 + 65,
     "case": 2880 + 36 + 130,
-    "commands": 560 + 10 + 29,
+    "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 24,
     "feti": 6300 + 8 + 35,
     "homogenization": 3230 + 58 + 1,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1161
+FILES, TOTAL = 310, 45000 + 800 + 1162
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
