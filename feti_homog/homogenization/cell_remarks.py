@@ -7,7 +7,8 @@ import numpy as np
 from feti_homog.case import Case, bond_laws, cell_sizes, interface_section
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials import engineering_constants, laws, voigt
-from feti_homog.mesh import CoarseMesh, Torus, submeshes
+from feti_homog.mesh import Torus, submeshes
+from feti_homog.microstructure.shapes import Ellipses
 from feti_homog.schema import wording
 from feti_homog.typing import AnyInt, Float, Int
 
@@ -57,10 +58,8 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
 
     `pairs` are as in `pairs_of`, `radii` as in `soft_springs`.
     """
-    lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
-    lost = cut_off(torus.mesh, case.cell.refine) if case.cell.order == 1 and not case.cell.fractions else 0.0
-    if lost > SAME_RATIO / 2:
-        lines.append(f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2")
+    mesh, has_curve = torus.mesh, len(torus.mesh.debonded_edges) > 0
+    lines = [*mesh.remarks, *cut_off(case, mesh.ellipses[mesh.arc_circle], mesh.points[mesh.arc_edges])]
     cell, matrix = case.cell, torus.mesh.triangles[torus.mesh.phase == 0]
     if cell.has_own_mesh and cell.boundary == "periodic" and (torus.mesh.representative[matrix] == matrix).all():
         lines.append("[cell] the matrix reaches no side of the cell: are its phase and another exchanged?")
@@ -95,13 +94,19 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int, radii: Float) -> tuple[st
     return tuple(lines)
 
 
-def cut_off(mesh: CoarseMesh, refine: int) -> float:
-    """Return the fraction of fibre area that straight edges lose along arcs after `refine` halvings; 0 without arcs."""
-    curves = mesh.ellipses[mesh.arc_circle]
-    ends = np.linalg.solve(curves.frames, (mesh.points[mesh.arc_edges] - curves.centres[:, None]).swapaxes(1, 2))
-    angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**refine
+def cut_off(case: Case, curves: Ellipses, arcs: Float) -> tuple[str, ...]:
+    """Name the fibre area outside linear elements, whose edges join the ends (a, 2, 2) of arcs of `curves` (a,).
+
+    Returns () for other elements and for cells with a fibre fraction, which a run compares with the mesh.
+    """
+    if case.cell.order != 1 or case.cell.fractions or not len(arcs):
+        return ()
+    ends = np.linalg.solve(curves.frames, (arcs - curves.centres[:, None]).swapaxes(1, 2))
+    angle = np.arccos(np.clip((ends[:, :, 0] * ends[:, :, 1]).sum(axis=1), -1.0, 1.0)) / 2**case.cell.refine
     area = np.abs(np.linalg.det(curves.frames))
-    return 1.0 - float(area @ np.sin(angle)) / float(area @ angle) if len(angle) else 0.0
+    lost = 1.0 - float(area @ np.sin(angle)) / float(area @ angle)
+    line = f"[cell] order = 1: polygons have {lost:.1%} less area than round fibres; refine, or order = 2"
+    return (line,) if lost > SAME_RATIO / 2 else ()
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:

@@ -184,7 +184,8 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
     disc, radii = lines.disc[circle], regions.ellipses.circles[circle, 2]
     is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
-    ends = noded.scale * lines.points[tile_filling.arc_edges(lines.curves)[0]]
+    edges, around = tile_filling.arc_edges(lines.curves)
+    ends = noded.scale * lines.points[edges]
     nothing = np.full((1, 2), np.nan)
     return CellSummary(
         width=regions.width,
@@ -206,6 +207,7 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
         voids=arrangement.voids,
         remarks=(
             *arrangement.remarks,
+            *cell_remarks.cut_off(case, regions.ellipses[around], ends),
             *cell_remarks.soft_springs(case, radii[is_fibre]),
             *cell_remarks.case_remarks(case),
             *cell_remarks.subdomain_remarks(case, len(regions.phase), subdomains, triangles),

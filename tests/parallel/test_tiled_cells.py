@@ -62,12 +62,17 @@ def share_of(case, comm):
     return tear_by_tiles(case, noded, LATTICE, comm, TILED)
 
 
+TABLE = {"geometry": "table", "width": 4.0, "height": 4.0, "order": 1, "refine": 0, "fibre_list": [
+    {"x": i % 4 + 0.5, "y": i // 4 + 0.5, "radius": 0.25 + 0.1 * (i % 2)} for i in range(16)]}  # fmt: skip
+
+
 @pytest.mark.few_ranks
-@pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("keys", [*KINDS.values(), TABLE], ids=[*KINDS, "linear, table"])
 def test_the_summary_is_that_of_the_whole_mesh(comm, keys):
-    """But for the number of subdomains: here they end with the tiles."""
-    case = case_of(keys)
+    """But for the number of subdomains: here they end with the tiles.  The table has a remark on lost area."""
+    case = cases.case_of({"mesh_size": 0.08} | keys) if keys is TABLE else case_of(keys)
     found = share_of(case, comm)
+    assert any("less area" in line for line in found.summary.remarks) == (keys is TABLE)
     (whole,) = distribute(case, coarse_mesh(case, MPI.COMM_SELF, SMALL), LATTICE, 1, TILED)
     for field in fields(found.summary):
         mine, other = (getattr(share.summary, field.name) for share in (found, whole))
