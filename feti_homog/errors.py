@@ -52,6 +52,12 @@ class CaseError(FetiHomogError):
     exit_code = ExitCode.INPUT
 
 
+class FolderError(FetiHomogError):
+    """The folder of a study's cases cannot be used: it is damaged, locked, or begun on other ranks."""
+
+    exit_code = ExitCode.INPUT
+
+
 class MeshError(FetiHomogError):
     """The cell cannot be meshed, or a user's mesh is faulty.  Each fault names the key, or nodes or elements."""
 

@@ -116,20 +116,10 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    if _stored_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
+    if refuse_other_sweep(directory, sweep) == sweep.entries and (directory / TABLE_FILE).exists():
         return
     with document_lock(directory):
-        stored = _stored_entries(directory)
-        reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
-        for old, new in zip(stored, sweep.entries, strict=False):
-            if old != new:
-                reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-                if old.inputs == new.inputs:
-                    in_words = "keys that do not vary, or in the content of a mesh"
-                    reason = f"its {old.folder} differs from this file in {in_words}"
-                break
-        if stored != sweep.entries[: len(stored)]:
-            raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
+        stored = refuse_other_sweep(directory, sweep)
         statuses = {stored_state(directory, entry).status for entry in sweep.entries}
         if not stored and (Status.DAMAGED in statuses or Status.DONE not in statuses):  # else it lost its list
             refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
@@ -146,8 +136,23 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
         atomic.replace_text(directory / TABLE_FILE, result_json.csv_text(table))
 
 
-def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
-    return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
+def refuse_other_sweep(directory: Path, sweep: Sweep) -> tuple[SweepCase, ...]:
+    """Return the stored cases, with which `sweep` must begin; () without a stored list.  On one rank.
+
+    Raises CaseError if the list is unreadable or has other cases.
+    """
+    stored = read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
+    reason = f"it has {len(stored)} cases, this file {len(sweep.entries)}"
+    for old, new in zip(stored, sweep.entries, strict=False):
+        if old != new:
+            reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+            if old.inputs == new.inputs:
+                in_words = "keys that do not vary, or in the content of a mesh"
+                reason = f"its {old.folder} differs from this file in {in_words}"
+            break
+    if stored != sweep.entries[: len(stored)]:
+        raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
+    return stored
 
 
 def read_index(directory: Path) -> Sweep:

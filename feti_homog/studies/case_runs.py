@@ -23,9 +23,13 @@ from feti_homog.typing import Intracomm
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """Return a line for each case of a sweep; with `directory` also status and progress.  On one rank."""
+    """Return a line for each case of a sweep; with `directory` also status and progress.  On one rank.
+
+    Raises CaseError if `directory` holds another sweep or a damaged list.
+    """
     if directory is None:
         return [f"{entry.folder}  {entry.describe(sweep.stress_unit)}".rstrip() for entry in sweep.entries]
+    case_folders.refuse_other_sweep(directory, sweep)
     states, lines = [case_folders.case_state(directory, entry) for entry in sweep.entries], list[str]()
     width = max(len(state.status) for state in states)
     for entry, state in zip(sweep.entries, states, strict=True):

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 from feti_homog import __version__
 from feti_homog.case import toml_files
-from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.errors import CaseError, ConvergenceError, FolderError
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.studies import case_folders, case_runs
 from feti_homog.studies.sweep_cases import Sweep
@@ -41,10 +41,14 @@ class Evaluator:
     def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
         """Run the cases of a sweep in the subfolder `name`.  Collective.
 
-        Returns result.json of all cases on rank 0, [] elsewhere; prints the first warnings.  Raises like `run_all`.
+        Returns result.json of all cases on rank 0, [] elsewhere; prints the first warnings.  Raises like `run_all`, but
+        FolderError in place of CaseError: the cases are sound.
         """
         folder = self.directory / name
-        case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
+        try:
+            case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=self.quiet or None)
+        except CaseError as error:
+            raise FolderError(*error.faults) from error
         documents = mpi_errors.on_root_only(
             self.comm, lambda: [case_folders.case_state(folder, entry).document or {} for entry in sweep.entries]
         )
@@ -114,6 +118,7 @@ class Study(ABC):
         Raises:
             CaseError: the folder holds another study or foreign files, another run writes to the folder, or a result
                 lacks a value that the study needs.
+            FolderError: the folder of an evaluation cannot be used.
             ConvergenceError: a case failed; or the study has no sound answer, after its files are written.
             FetiHomogError: a file cannot be written.
         """

@@ -8,6 +8,7 @@ import pytest
 from support.fitted_composites import case, fit, model, truth
 
 from feti_homog import CaseError, ConvergenceError, run, run_fit, run_sweep
+from feti_homog.errors import FolderError
 from feti_homog.studies import case_runs, fit_file
 from feti_homog.studies.predictions import exact_derivatives, predicted
 from feti_homog.system.parallel.mpi_errors import on_root
@@ -59,7 +60,7 @@ def test_warnings_of_the_first_cases_are_printed_once_and_kept(comm, shared_path
 
 
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):
-    """Only evaluations that were not finished are computed again."""
+    """Only evaluations that were not finished are computed again; one with a damaged list is no failed evaluation."""
     out, calls, compute = shared_path / "out", [], case_runs.run_all
 
     def counted(sweep, folder, *arguments, **named):
@@ -74,7 +75,11 @@ def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, m
             run_fit(glass, out, comm)
     before = stamps(out)
     assert calls == ["evaluation-0001", "evaluation-0002", "evaluation-0003"] and len(before) == 2
-    whole = run_fit(glass, shared_path / "whole", comm)
+    whole, index = run_fit(glass, shared_path / "whole", comm), out / "evaluation-0002/sweep.json"
+    on_root(comm, index.write_text, index.read_text()[:99])
+    with pytest.raises(FolderError, match=r"evaluation-0002/sweep.json is damaged: .*remove it"):
+        run_fit(glass, out, comm)
+    on_root(comm, index.unlink)
     found = run_fit(glass, out, comm)
     assert before.items() <= stamps(out).items() and len(stamps(out)) == found["evaluations"]
     assert found["unknowns"].keys() == whole["unknowns"].keys()

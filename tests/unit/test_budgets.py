@@ -18,7 +18,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # plain statements, friction without load, rates in space, breaks on later legs, ranks with different cases; the third:
 # conductivity, images, boundaries, ranges of numbers in results that verify compared before, corners, curves of fits.
 LINES = {
-    ".": 470 + 18 + 3,
+    ".": 470 + 18 + 9,
     "analysis": 3000 + 140 + 65,
     "case": 2880 + 36 + 130,
     "commands": 560 + 10 + 30,
@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 146,
     "results": 2430 + 227 + 42,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 82,
+    "studies": 2950 + 129 + 96,
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1169
+FILES, TOTAL = 310, 45000 + 800 + 1189
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
