@@ -177,25 +177,25 @@ def soft_springs(case: Case, radii: Float) -> list[str]:
     return lines
 
 
-def process_zone(case: Case) -> tuple[float, float]:
-    """Return the least process zone length E' G_Ic / sigma_c^2, and sigma_c.
+def process_zone(case: Case) -> tuple[float, float, int]:
+    """Return the least process zone length E' G_Ic / sigma_c^2, its sigma_c, and the index of its interface.
 
-    Both are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and sigma_c are the
-    toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane state, equal to
-    E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase.  Bonds at least 100 times
-    as strong as the weakest bond hold, and do not count.
+    Length and sigma_c are inf unless bonds break by energy.  sigma_c = sqrt(2 k_n G_Ic); for cohesive laws, G_Ic and
+    sigma_c are the toughness and strength in the pure mode with the shorter zone.  E' is Young's modulus in the plane
+    state, equal to E / (1 - nu^2) in plane strain, along the most compliant axis of the most compliant phase that the
+    interface may join.  Bonds at least 100 times as strong as the weakest bond hold, and do not count.
     """
-    pure = []
-    for bond in case.interfaces:
-        pure += [(bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)]
+    zones = []
+    for number, bond in enumerate(case.interfaces):
+        pure = [(bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)]
         if bond.toughness and bond.normal_stiffness:
             pure.append((bond.toughness, math.sqrt(2 * bond.normal_stiffness * bond.toughness)))
-    pairs = [(toughness / strength**2, strength) for toughness, strength in pure if toughness and strength]
-    if not pairs:  # also in conduction, where phases have no modulus
-        return math.inf, math.inf
-    limit = 100.0 * min(strength for _, strength in pairs)
-    length, strength = min((pair for pair in pairs if pair[1] < limit), default=(math.inf, math.inf))
-    return min(_modulus(case, phase) for phase in case.materials) * length, strength
+        for toughness, strength in pure:
+            if toughness and strength:  # not in conduction, where phases have no modulus
+                modulus = min(_modulus(case, phase) for phase in bond.between or case.materials)
+                zones.append((modulus * toughness / strength**2, strength, number))
+    limit = 100.0 * min((strength for _, strength, _ in zones), default=0.0)
+    return min((zone for zone in zones if zone[1] < limit), default=(math.inf, math.inf, 0))
 
 
 def _modulus(case: Case, phase: str) -> float:
@@ -212,10 +212,11 @@ def warnings(case: Case, width: float, edge: float, radii: Float) -> list[str]:
         edge: longest coarse edge between phases, which `refine` halves.
         radii: radii of fibres, NaN unless round.
     """
-    (length, strength), softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
+    (length, strength, number), softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
     if math.isinf(length):
         return lines
-    law, radii = f'[interface] law = "{case.interfaces[0].criterion}"', radii[np.isfinite(radii)]
+    section, bond = interface_section.labelled(case.interfaces)[number]
+    law, radii = f'[{section}] law = "{bond.criterion}"', radii[np.isfinite(radii)]
     ratio = length / radii.mean() if len(radii) else 1.0
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
     zone = f"E' G / s^2 = {length:.3g} long with the strength s = {strength:.3g}"

@@ -24,7 +24,7 @@ LINES = {
     "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 24,
     "feti": 6300 + 8 + 35,
-    "homogenization": 3230 + 58 + 8,
+    "homogenization": 3230 + 58 + 9,
     "interface": 4000 + 24 - 38,
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 0,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1189
+FILES, TOTAL = 310, 45000 + 800 + 1190
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

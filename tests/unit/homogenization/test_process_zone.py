@@ -53,7 +53,7 @@ def test_the_length_is_that_of_the_matrix_and_the_strength(stiffness, plane, len
     """E' G_Ic / sigma_c^2 with sigma_c = 90 or 60 MPa, E' = 2790 / (1 - 0.33^2) or 2790."""
     strength = {2025.0: 90.0, 900.0: 60.0}[stiffness]
     modulus = 2790.0 / (1 - 0.33**2) if plane == "strain" else 2790.0
-    found, traction = cell_remarks.process_zone(case_of(stiffness, plane=plane))
+    found, traction, _ = cell_remarks.process_zone(case_of(stiffness, plane=plane))
     assert traction == pytest.approx(strength, rel=1e-12)
     assert found == pytest.approx(modulus * 2.0 / strength**2, rel=1e-12) and found == pytest.approx(length, abs=5e-4)
 
@@ -98,7 +98,7 @@ def test_conductors_have_no_such_length():
 
 def test_other_bonds_have_no_such_length():
     assert (
-        cell_remarks.process_zone(case_of(criterion="max")) == (np.inf, np.inf)
+        cell_remarks.process_zone(case_of(criterion="max")) == (np.inf, np.inf, 0)
         and warnings(case_of(criterion="max")) == []
     )
 
@@ -119,16 +119,20 @@ def test_the_warning_of_a_ratio_gives_the_stiffness_that_ends_it():
 
 @pytest.mark.parametrize("shear", [0.09, 0.3], ids=["shear is shorter", "opening is shorter"])
 def test_the_zone_is_that_of_the_shorter_mode_of_the_weakest_pair(shear):
-    """Lengths G / R^2 of pure modes: of one pair 0.05 / 40^2 and 0.09 or 0.3 / 60^2, of the other ten times."""
-    modulus = 2790.0 / (1 - 0.33**2)
+    """Lengths G / R^2 of pure modes: of one pair 0.05 / 40^2 and 0.09 or 0.3 / 60^2, of the other ten times.
+
+    The modulus is that of the matrix, or of the coating if it is on the weak pair.
+    """
     weak = COHESIVE | {"tangential_toughness": shear}
     tough = weak | {"normal_toughness": 0.5, "tangential_toughness": 10 * shear}
-    for pairs in ((weak,), (weak, tough), (tough, weak)):
+    epoxy, coating = 2790.0 / (1 - 0.33**2), 1e4 / (1 - 0.3**2)
+    for pairs, modulus in (((weak,), epoxy), ((weak, tough), epoxy), ((tough, weak), coating)):
         between = (["coating", "matrix"], ["fibre", "coating"])
         interfaces = [own | {"between": pair} for own, pair in zip(pairs, between, strict=False)]
         document = DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}
-        found, _ = cell_remarks.process_zone(cases.parse(document, Path()))
+        found, _, number = cell_remarks.process_zone(cases.parse(document, Path()))
         assert found == pytest.approx(modulus * min(0.05 / 40.0**2, shear / 60.0**2))
+        assert pairs[number] is weak
 
 
 @pytest.mark.parametrize(("factor", "zones"), [(10.0, 1), (100.0, 0)])
@@ -143,15 +147,19 @@ def test_bonds_that_hold_have_no_zone(factor, zones):
     assert sum("elements on the interface are up to 0.02 long" in line for line in lines) == zones
 
 
-def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():
-    """sqrt(2 k_n G_Ic) of k_n = 2025 and 900, though the softer springs have the larger toughness."""
+@pytest.mark.parametrize("first", [["coating", "matrix"], ["fibre", "coating"]])
+def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone(first):
+    """E' / (2 k_n) and sqrt(2 k_n G_Ic) of k_n = 2025, though the softer springs have the larger toughness."""
+    pairs = {"coating-matrix": (2025.0, 2.0), "fibre-coating": (900.0, 8.0)}
+    names = sorted(pairs, key=lambda name: name.split("-") != first)
     interfaces = [
         {"criterion": "energy", "normal_stiffness": k, "tangential_stiffness": k, "toughness": G, "between": pair}
-        for k, G, pair in ((900.0, 8.0, ["coating", "matrix"]), (2025.0, 2.0, ["fibre", "coating"]))
+        for pair, (k, G) in ((name.split("-"), pairs[name]) for name in names)
     ]
     case = cases.parse(DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}, Path())
     line = cell_remarks.warnings(case, 20.0, 50.0, np.array([7.5]))[0]
     assert "for sigma_c = sqrt(2 k_n G_Ic) = 90, " in line and f"= {2790.0 / (1 - 0.33**2) / 4050:.3g} long" in line
+    assert line.startswith(f"[interface {names.index('coating-matrix') + 1}] law")
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.2])
