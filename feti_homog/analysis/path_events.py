@@ -182,7 +182,7 @@ def resumable(context: AnalysisContext) -> int:
         return 0
     stored_events = context.checkpoint.count()
     if not stored_events:
-        say("  there is no checkpoint: the path starts from the beginning")
+        say("  no events are stored: the path starts from the beginning")
         return 0
     count = holding(context, consistent(context, stored_events))
     if count < stored_events:

@@ -119,7 +119,7 @@ def replaced(directory: Path, case: Case) -> str:
 
 def foreign(directory: Path, name: str, kind: str) -> CaseError:
     """Construct the CaseError for a foreign file with the name of a result.  `kind` names the run, such as "sweep"."""
-    fault = f"no {kind} of this program wrote {name}, and this one would replace it"
+    fault = f"no {kind} of this program wrote {name}, or it is damaged, and this one would replace it"
     return CaseError(f"--out {directory}: {fault}; move it away or choose another folder")
 
 

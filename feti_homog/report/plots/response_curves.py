@@ -98,7 +98,7 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     axes.set(xlabel=f"${plot_helpers.SYMBOLS[plane[0]]}${unit}", ylabel=f"${plot_helpers.SYMBOLS[plane[1]]}${unit}")
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
-    title = plot_helpers.title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
+    title = plot_helpers.title_of(case, f"onset of debonding or softening, plane {case['analysis']['plane']}")
     axes.set_title("\n".join(filter(None, [title, *plot_helpers.bond_limits(case), ", ".join(notes)])))
     plot_helpers.faint_grid(axes)
     return picture

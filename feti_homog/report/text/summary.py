@@ -47,7 +47,7 @@ STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness")
 ANGLE = ReportedAnalysis("angle", "debonding angle", is_curve=True)
 PATH = ReportedAnalysis("path", "load path", is_curve=True, is_followed=True)
 LOAD = ReportedAnalysis("load", "equilibrium under a load", picture="load")
-ENVELOPE = ReportedAnalysis("envelope", "onset of debonding")
+ENVELOPE = ReportedAnalysis("envelope", "onset of debonding or softening")
 CONDUCTIVITY = ReportedAnalysis("conductivity", "effective conductivity")
 ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, CONDUCTIVITY, STIFFNESS)}
 

@@ -83,7 +83,7 @@ def test_pictures_of_the_page_are_files_of_a_result() -> None:
 
 def test_the_table_of_an_envelope() -> None:
     table, *_ = answers(envelope() | bonded_numbers(), page.MOST_ROWS)
-    assert table.title == "Onset of debonding in the plane S22, S12 (GPa): 3 directions"
+    assert table.title == "Onset of debonding or softening in the plane S22, S12 (GPa): 3 directions"
     assert [column.name for column in table.columns] == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent"]
     assert table.cells[1] == ["90", "0", "4", "1", "30.00", "1", "0"]
     assert table.cells[2] == ["180", "none", "none", "", "", "", ""]

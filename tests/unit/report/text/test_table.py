@@ -63,7 +63,7 @@ def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), 
 def test_the_least_and_the_largest_load_and_some_directions():
     whole = document(72, ("normal", "tangential", "axial"))
     lines = envelope_table(whole).lines
-    assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
+    assert lines[0] == "Onset of debonding or softening in the plane S22, S12 (MPa): 72 directions"
     assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
     assert lines[2].strip() == "largest  81 at 355 degrees"
     assert len(lines) == 5 + 12 and max(map(len, lines)) < 80
@@ -85,7 +85,7 @@ def test_strains_have_no_unit_and_nothing_may_break():
     assert len(lines) == 2
     whole = document(4, ("psi",))
     whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
-    assert envelope_table(whole).lines[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
+    assert envelope_table(whole).lines[0] == "Onset of debonding or softening in the plane E11, gamma12: 4 directions"
 
 
 @pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])
