@@ -202,7 +202,8 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
                     return
                 content = stream.read(size) if is_sound else b""
                 if not is_sound or zlib.crc32(content) != checksum:
-                    raise CaseError(f"{path} is damaged; `truncate -s {place} {path}` keeps {max(number - 1, 0)} events")
+                    events = max(number - 1, 0)
+                    raise CaseError(f"{path} is damaged; `truncate -s {place} {path}` keeps {events} events")
                 place += PREFIX.size + size
                 yield place, content
     except OSError as error:
