@@ -105,6 +105,13 @@ def abscissa(document: Document) -> tuple[str, Float]:
     return name, table[name]
 
 
+def abscissas(document: Document) -> list[str]:
+    """Return up to three names: the quantity of `abscissa`, then the strains that change most on the legs."""
+    strains = voigt.voigt_names(len(document["path"][0]["strain"]))[0]
+    leading = (strains[component] for _, component, _ in largest_of_legs(document))
+    return list(dict.fromkeys([abscissa(document)[0], *leading]))[:3]
+
+
 def temperature_of(document: Document, number: int) -> float | None:
     """Return the temperature of point `number` on a leg that changes only the temperature; None elsewhere."""
     point = document["path"][number]

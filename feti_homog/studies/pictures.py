@@ -80,7 +80,16 @@ def figure_over_fractions(table: SweepTable) -> Figure:
         shear = r" ($\gamma_{12}$)" if name == "C33" and names == [*PANELS] else ""
         title = NAMES.get(name, name.replace("_S", " $S_{") + "}$")
         axes.set(xlabel="fibre fraction", ylabel=f"{title}{shear}\n{unit}".rstrip())
-        _limit(axes)
+        # Values with their errors, and bounds, which widen the range by at most half at each end.
+        shapes = [path for shape in axes.collections for path in shape.get_paths()]
+        values: list[Any] = [np.asarray(path.vertices)[:, 1] for path in shapes]
+        bounds = [line.get_ydata() for line in axes.lines if "bounds" in str(line.get_label())]
+        values += [line.get_ydata() for line in axes.lines if "bounds" not in str(line.get_label())]
+        low, high = np.nanmin(np.concatenate(values)), np.nanmax(np.concatenate(values))
+        ends = np.clip(np.concatenate([[low, high], *bounds]), 1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low)
+        low, high = np.nanmin(ends), np.nanmax(ends)
+        margin = 0.06 * (high - low) or 0.06 * abs(high) or 1.0
+        axes.set_ylim(low - margin, high + margin)
         plot_helpers.faint_grid(axes)
         axes.tick_params(labelbottom=True)
     for axes in panels[len(names) :]:
@@ -91,18 +100,6 @@ def figure_over_fractions(table: SweepTable) -> Figure:
     handles = [handle for axes in panels[::-1] for handle in axes.get_legend_handles_labels()[0]]
     plot_helpers.legend_below(picture, [*{handle.get_label(): handle for handle in handles}.values()])
     return picture
-
-
-def _limit(axes: Axes) -> None:
-    """Limit the ordinate to values with their errors; bounds widen this range by at most half at each end."""
-    values: list[Any] = [np.asarray(path.vertices)[:, 1] for shape in axes.collections for path in shape.get_paths()]
-    bounds = [line.get_ydata() for line in axes.lines if "bounds" in str(line.get_label())]
-    values += [line.get_ydata() for line in axes.lines if "bounds" not in str(line.get_label())]
-    low, high = np.nanmin(np.concatenate(values)), np.nanmax(np.concatenate(values))
-    ends = np.clip(np.concatenate([[low, high], *bounds]), 1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low)
-    low, high = np.nanmin(ends), np.nanmax(ends)
-    margin = 0.06 * (high - low) or 0.06 * abs(high) or 1.0
-    axes.set_ylim(low - margin, high + margin)
 
 
 def bounds_of(document: Document) -> dict[str, tuple[float, float]]:

@@ -29,14 +29,14 @@ LINES = {
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
     "microstructure": 2140 + 24 + 62,
-    "report": 3420 + 217 + 146,
-    "results": 2430 + 227 + 43,
+    "report": 3420 + 217 + 160,
+    "results": 2430 + 227 + 50,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 96,
+    "studies": 2950 + 129 + 93,
     "system": 1770 + 26 + 10,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1201
+FILES, TOTAL = 310, 45000 + 800 + 1219
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

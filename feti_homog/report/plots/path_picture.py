@@ -32,40 +32,63 @@ AREAS = {
 
 
 def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> Figure:
-    """Draw stresses (strains if no stress acts) and interface states over the leading strain, with the landmarks.
+    """Draw stresses (strains if no stress acts) and interface states over the leading strains, with the landmarks.
 
     A panel between the two shows the change of temperature, if any; if it varies alone, it is the axis of all panels.
-    Selected points carry their numbers.
+    Selected points carry their numbers.  Each strain that leads a leg has a column of panels.
     """
-    points, case = document["path"], document["case"]
-    axis, strain = path_curves.abscissa(document)
+    points, case, names = document["path"], document["case"], path_curves.abscissas(document)
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
-    warms = axis != "temperature" and any(point.get("temperature") for point in points)
+    warms = names[0] != "temperature" and any(point.get("temperature") for point in points)
     heights = (2.2, 1, 1) if warms else (2.2, 1)
     picture = look.figure(7.2, 8.8 if warms else 7.2)
     narrow = picture.get_figwidth() < plot_helpers.NARROW
-    upper, *middle, lower = picture.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-    has_stress = _main_curves(upper, document, axis, style)
+    panels = picture.subplots(
+        len(heights), len(names), sharex="col", sharey="row", squeeze=False, height_ratios=heights
+    )
+    table = path_curves.table_of(points)
+    way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
+    for name, (upper, *middle, lower) in zip(names, panels.T, strict=True):
+        has_stress = _main_curves(upper, document, name, style)
+        for axes in middle:
+            axes.plot(*(np.append(0.0, way[key]) for key in (name, "temperature")), color="0.3", lw=1.2, **style)
+        _count_curves(lower, document, table[name], style)
+        lower.set_xlabel(_axis_label(name))
+        _mark_landmarks(upper, document, name, has_stress, narrow)
+        upper.margins(y=0.12)  # room for numbers
+        for axes in (upper, *middle, lower):
+            axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
+            if axes.dataLim.ymin >= -path_curves.ZERO * axes.dataLim.ymax:
+                axes.set_ylim(bottom=-0.02 * axes.dataLim.ymax or None)
+        upper.xaxis.set_major_locator(MaxNLocator(5 if narrow or len(names) > 1 else 7, steps=ROUND))
+    upper, *middle, lower = panels[:, 0]
     upper.set_ylabel(f"stress\n{plot_helpers.stress_unit(case)}" if has_stress else "macroscopic strain")
-    lower.set_xlabel(_axis_label(axis))
-    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
-    upper.set_title("\n".join(filter(None, (heading, document.get("unfinished"), *plot_helpers.bond_limits(case)))))
     for axes in middle:
-        way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
-        axes.plot(*(np.append(0.0, way[name]) for name in (axis, "temperature")), color="0.3", lw=1.2, **style)
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
-    _count_curves(lower, document, strain, style)
-    lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
+    lower.set_ylabel("interface\nnodes")
+    panels[-1, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
+    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
+    title = "\n".join(filter(None, (heading, document.get("unfinished"), *plot_helpers.bond_limits(case))))
+    (upper.set_title if len(names) == 1 else picture.suptitle)(title)
+    plot_helpers.finish_curves(*panels.flat)
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
     numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
-    peak = landmarks.peak_of(document)
-    unit = "" if narrow else plot_helpers.plain(case.get("output", {}).get("stress_unit", ""))
-    height = path_curves.table_of(points)[peak["stress_name" if has_stress else "strain_name"]]
-    curve, ink = np.stack([strain, height], axis=1), plot_helpers.STRESS_INK[peak["stress_name"]]
+    height = table[landmarks.peak_of(document)["stress_name" if has_stress else "strain_name"]]
+    for name, axes in zip(names, panels[0], strict=True):
+        _number_points(axes, np.stack([table[name], height], axis=1), numbers)
+    return picture
+
+
+def _mark_landmarks(axes: Axes, document: Document, name: str, has_stress: bool, narrow: bool) -> None:
+    """Mark the landmarks on the curve of their stress (or strain) over the quantity `name`, with labels."""
+    table, peak = path_curves.table_of(document["path"]), landmarks.peak_of(document)
+    unit = "" if narrow else plot_helpers.plain(document["case"].get("output", {}).get("stress_unit", ""))
+    height = table[peak["stress_name" if has_stress else "strain_name"]]
+    ink = plot_helpers.STRESS_INK[peak["stress_name"]]
     star: dict[str, Any] = {"markeredgecolor": "white", "linestyle": "none", "color": ink}
     largest = landmarks.name_of(document, peak)
-    if largest == landmarks.LARGEST and peak.get("event") == len(points) - 1:
+    if largest == landmarks.LARGEST and peak.get("event") == len(height) - 1:
         largest += ", no peak yet,"
     for event in dict.fromkeys(peak[f"{title}event"] for title in MARKS if f"{title}event" in peak):
         titles = [title for title in MARKS if peak.get(f"{title}event") == event]
@@ -78,16 +101,8 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
             label += rf" at $\Delta{{T}}={temperature:.4g}$"
         bond = "" if narrow else landmarks.bond_of(peak, last).replace(" degrees", "°")
         label = f"{label}\n{bond}".rstrip()
-        upper.plot(*curve[event], MARKS[last], ms=13 if MARKS[last] == "*" else 7, zorder=6, **star, label=label)
-    upper.margins(y=0.12)  # room for numbers
-    for axes in (upper, *middle, lower):
-        axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        if axes.dataLim.ymin >= -path_curves.ZERO * axes.dataLim.ymax:
-            axes.set_ylim(bottom=-0.02 * axes.dataLim.ymax or None)
-    upper.xaxis.set_major_locator(MaxNLocator(5 if narrow else 7, steps=ROUND))
-    plot_helpers.finish_curves(upper, *middle, lower)
-    _number_points(upper, curve, numbers)
-    return picture
+        place = table[name][event], height[event]
+        axes.plot(*place, MARKS[last], ms=13 if MARKS[last] == "*" else 7, zorder=6, **star, label=label)
 
 
 def _axis_label(axis: str) -> str:
@@ -163,7 +178,6 @@ def _count_curves(axes: Axes, document: Document, strain: Array, style: Mapping[
         damaged = [point["damaged_share"] * sum(point[key] for key in STATES.values()) for point in points]
         label = "damaged share × nodes"
         axes.plot(strain, damaged, color=drawn_cell.damage_colour(0.5), linewidth=1.2, label=label, **way)
-    axes.set_ylabel("interface\nnodes")
     axes.yaxis.set_major_locator(MaxNLocator("auto", steps=ROUND, integer=True))
 
 

@@ -194,3 +194,17 @@ def test_statuses_of_the_unloaded_cell_are_the_statuses_before() -> None:
     lower = path_picture.figure(document).axes[-1]
     drawn_counts = {line.get_label(): [*line.get_ydata()] for line in lower.lines}
     assert drawn_counts["in contact"] == [2, 2, 0] and drawn_counts["open"] == [0, 0, 2]
+
+
+@pytest.mark.parametrize(("shears", "names"), [(False, ["E11"]), (True, ["E11", "gamma12"])])
+def test_each_strain_that_leads_a_leg_has_its_panels(shears, names):
+    document = bar([{"E11": 5.0}, {"E11": 4.0, "gamma12": 3.0}], [(0.5, 1.0, 5.0, False), (1.0, 1.0, 4.0, False)])
+    if shears:
+        document["path"][1]["strain"][5], document["path"][1]["stress"][5] = 3.0, 2.0
+    axes = path_picture.figure(document).axes
+    labels = {"E11": "macroscopic strain $E_{11}$", "gamma12": r"macroscopic strain $\gamma_{12}$"}
+    assert [panel.get_xlabel() for panel in axes if panel.get_xlabel()] == [labels[name] for name in names]
+    assert len(axes) == 2 * len(names)
+    curves = [line.get_xydata() for line in axes[len(names) - 1].lines if line.get_linewidth() == 2.0]
+    ends = [curve[-1].tolist() for curve in curves if len(curve)]
+    assert ([3.0, 2.0] in ends) == shears and ([3.0 if shears else 4.0, 4.0] in ends)

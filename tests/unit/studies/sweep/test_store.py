@@ -91,7 +91,7 @@ def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
     sweep, out = sweep_cases.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_text("mine")
-    with pytest.raises(CaseError, match=f"no sweep of this program wrote {Path(name).parts[0]}, and this one would"):
+    with pytest.raises(CaseError, match=f"no sweep of this program wrote {Path(name).parts[0]}, or it is damaged"):
         case_folders.prepare_folder(out, sweep)
     assert [path.read_text() for path in out.rglob("*") if path.is_file()] == ["mine"]
 
