@@ -80,7 +80,7 @@ def _cost_lines(
     for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True)):
         yield f"rank {rank:<5} {count} subdomain{'s' if count > 1 else ''}, {sum(components) * n} degrees of freedom"
     columns = multipliers if plan.preconditioner == "influence" else 0
-    memory = partition_policy.memory(case, nodes, subdomains, components, columns)
+    memory = partition_policy.memory(case, nodes, subdomains, components, columns, summary.coarse_triangles)
     end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
     all_bonds = f", {partition_policy.in_words(end)} if all bonds break" if breaks else ""

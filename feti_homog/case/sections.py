@@ -112,8 +112,9 @@ class Decomposition:
     cut: str = key(
         types.choice("auto", "bodies"),
         '"bodies": each body is cut separately. "auto": the faster way: the cell is cut across its materials if no '
-        "faces can separate, unknowns are at most 400 000, stiffnesses differ by at most 1e3, and the case gives no "
-        "other key here and no solver option except tolerances and options that only print; else as with bodies.",
+        "faces can separate, unknowns are at most 400 000 (more if bodies are small), stiffnesses differ by at most "
+        "1e3, and the case gives no other key here and no solver option except tolerances and options that only "
+        "print; else as with bodies.",
         default="auto",
     )
 

@@ -137,7 +137,8 @@ def distribute(
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    bodies, cut = int(parts.max()) + 1, _cut_across(case, torus, lattice, n_ranks, policy)
+    bodies = int(parts.max()) + 1
+    cut = _cut_across(case, torus, bodies, lattice, n_ranks, policy)
     across = cut is not None
     if cut is None:
         sides = parts[np.stack(torus.sides[:2])]
@@ -217,12 +218,12 @@ def summary_of(case: Case, noded: gmsh_mesher.NodedCell, subdomains: int, triang
 
 
 def _cut_across(
-    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
+    case: Case, torus: Torus, bodies: int, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> partition.Partition | None:
     """Cut the cell across materials; None if the case or the policy does not allow it, or METIS leaves ranks empty."""
     elements, corners = torus.mesh.triangles.shape
     dofs, is_image = elements * (corners - 2) * lattice.intervals**2, corners == 4
-    pieces = policy.across_pieces(dofs, n_ranks, is_image) if can_be_cut_across(case) else 0
+    pieces = policy.across_pieces(dofs, bodies, n_ranks, is_image) if can_be_cut_across(case) else 0
     if not 0 < pieces <= elements:
         return None
     if pieces == n_ranks == 2 and dofs >= policy.strip_dofs and (strips := partition.halves(torus)):

@@ -29,7 +29,8 @@ MOST_CONTRAST = 1e3
 # Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 # Bytes of a rank: without degrees of freedom, per degree of freedom, per plane subdomain, more on springs, and per
-# multiplier with influence columns.  For 37 cells, estimates are 0.78 to 1.24 times the measured memory.
+# multiplier with influence columns.  For 37 cells, estimates are 0.78 to 1.24 times the measured memory.  A coarse
+# triangle takes as much as a degree of freedom; without refinement, estimates of four runs are 0.85 to 1.1 times it.
 BASE_BYTES, DOF_BYTES, SUBDOMAIN_BYTES, SPRING_BYTES, COLUMN_BYTES = 1.5e8, 9.9e2, 7.0e5, 7.7e5, 2.6e4
 INTERIOR_BYTES = 4.7e2  # more per degree of freedom if the run keeps the factors of interiors
 # More per displacement of the largest problem in a cell of one factor; for seven cells, estimates are within 3 %.
@@ -60,6 +61,8 @@ class PartitionPolicy:
         tiles: rules for the tiles of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body; so are
             label images of any size, because their bodies have long boundaries; 0 for no such cuts.
+        subdomain_dofs: a subdomain costs as much as this many degrees of freedom; if bodies are smaller on average,
+            cuts across materials pay off in cells larger than `across_dofs` by the same ratio.
         across_piece_dofs: size of a piece across materials, with as many multipliers as a smaller piece within a body.
         whole_dofs: on one rank, a cell across materials is whole up to this size: one sparse factor takes less time
             than dense piece matrices, which need half the memory.
@@ -80,14 +83,16 @@ class PartitionPolicy:
     breakable_boundary_dofs: int = 2500
     tiles: tiling.TilePolicy = tiling.DEFAULT_TILES
     across_dofs: int = 0
+    subdomain_dofs: int = 550
     across_piece_dofs: int = 7000
     whole_dofs: int = 400_000
     whole_ranks: int = 2
     strip_dofs: int = 30_000
 
-    def across_pieces(self, dofs: int, n_ranks: int, is_image: bool = False) -> int:
+    def across_pieces(self, dofs: int, bodies: int, n_ranks: int, is_image: bool = False) -> int:
         """Return the number of pieces across materials, a multiple of `n_ranks`; 0 if the cell is to be cut by body."""
-        if not self.across_dofs or (dofs > self.across_dofs and not is_image):
+        limit = self.across_dofs * max(1.0, self.subdomain_dofs * bodies / dofs)
+        if not self.across_dofs or (dofs > limit and not is_image):
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
             return n_ranks
@@ -171,7 +176,7 @@ def keeps_interiors(case: Case) -> bool:
 
 
 def memory(
-    case: Case, nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int
+    case: Case, nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int, triangles: int
 ) -> float:
     """Estimate the memory of the largest rank, in bytes.
 
@@ -179,13 +184,15 @@ def memory(
         nodes, subdomains: numbers of nodes and subdomains on each rank.
         components: displacements at a node in each problem.
         columns: multipliers that have influence columns.
+        triangles: coarse triangles of the cell.
     """
     dofs = sum(components) * max(nodes)
     of_interiors = dofs * INTERIOR_BYTES if keeps_interiors(case) else 0.0
     factors = max(components) * max(nodes) * FACTOR_BYTES if max(subdomains) == 1 else of_interiors
     springs = SPRING_BYTES if phase_laws.has_springs(case) else 0.0
     matrices = sum(components) / 2 * max(subdomains) * (SUBDOMAIN_BYTES + springs)
-    return BASE_BYTES + dofs * DOF_BYTES + factors + matrices + columns / len(nodes) * COLUMN_BYTES
+    of_all_ranks = columns * COLUMN_BYTES + triangles * DOF_BYTES
+    return BASE_BYTES + dofs * DOF_BYTES + factors + matrices + of_all_ranks / len(nodes)
 
 
 def memory_to_the_end(case: Case, before: float, multipliers: int, columns: int, ranks: int) -> float:

@@ -118,8 +118,8 @@ def can_be_torn_by_tiles(
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     if not isinstance(noded, gmsh_mesher.NodedCell) or len(noded.parts) < 2 or on_one_rank:
         return False
-    triangles = element_estimate.ElementEstimate.of(case.cell, noded.arrangement).triangles
-    return not (policy.across_pieces(round(triangles * lattice.intervals**2), 1) and can_be_cut_across(case))
+    dofs = round(element_estimate.ElementEstimate.of(case.cell, noded.arrangement).triangles * lattice.intervals**2)
+    return not (policy.across_pieces(dofs, len(noded.regions.phase), 1) and can_be_cut_across(case))
 
 
 def tear_by_tiles(

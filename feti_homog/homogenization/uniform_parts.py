@@ -113,10 +113,11 @@ class ForcesBetweenParts:
         is_shared[problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))] = True
         touching = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
         mesh, classes = _restricted(torn, touching)
-        part_of = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
-        used, material = np.unique(part_of, return_inverse=True)
-        mixed = tuple(parts[k].is_mixed for k in used)
-        body = assembly.assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
+        kinds = {(p.L.tobytes(), p.is_mixed): p for p in parts}  # few, unlike the parts
+        numbers = dict(zip(kinds, range(len(kinds)), strict=True))
+        material = np.repeat([numbers[p.L.tobytes(), p.is_mixed] for p in parts], [len(p.mesh.nodes) for p in parts])
+        L, mixed = np.stack([p.L for p in kinds.values()]), tuple(p.is_mixed for p in kinds.values())
+        body = assembly.assemble(mesh, L, problem, mixed, material[touching])
         sides = np.concatenate([assembly.side_loads(p.submesh, p.mesh, problem) for p in parts])
         self._dofs, self._K = problem.dofs(classes), body.K
         self._Q = np.hstack([body.Q, sides[self._dofs]])

@@ -20,11 +20,11 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES = {
     ".": 470 + 18 + 9,
     "analysis": 3000 + 140 + 65,
-    "case": 2880 + 36 + 130,
+    "case": 2880 + 36 + 131,
     "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 24,
     "feti": 6300 + 8 + 35,
-    "homogenization": 3230 + 58 + 9,
+    "homogenization": 3230 + 58 + 18,
     "interface": 4000 + 24 - 38,
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
@@ -36,7 +36,7 @@ LINES = {
     "system": 1770 + 26 + 10,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1219
+FILES, TOTAL = 310, 45000 + 800 + 1229
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

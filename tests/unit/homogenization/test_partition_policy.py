@@ -57,17 +57,24 @@ def test_cells_of_fewer_pieces_than_ranks_are_cut_by_bodies():
     [(60_000, 4, 8), (12_000, 2, 2), (12_000, 4, 4), (210_000, 1, 1), (210_000, 2, 2), (500_000, 1, 0)],
 )
 def test_pieces_are_of_the_fastest_size(dofs, ranks, pieces):
-    assert BY_COST.across_pieces(dofs, ranks) == pieces
-    assert DEFAULT_POLICY.across_pieces(dofs, ranks) == DEFAULT_POLICY.across_pieces(dofs, ranks, True) == 0
+    assert BY_COST.across_pieces(dofs, 9, ranks) == pieces
+    assert DEFAULT_POLICY.across_pieces(dofs, 9, ranks) == DEFAULT_POLICY.across_pieces(dofs, 9, ranks, True) == 0
 
 
 def test_label_images_of_any_size_are_cut_across_materials():
-    assert BY_COST.across_pieces(7_000_000, 2, True) == 1000
-    assert BY_COST.across_pieces(300_000, 2, True) == BY_COST.across_pieces(300_000, 2) == 2
+    assert BY_COST.across_pieces(7_000_000, 9, 2, True) == 1000
+    assert BY_COST.across_pieces(300_000, 9, 2, True) == BY_COST.across_pieces(300_000, 9, 2) == 2
 
 
-def memory(case=None, dofs=(100_000,), subdomains=(9,), components=(2,), columns=0):
-    return partition_policy.memory(case or make_case(), [n // 2 for n in dofs], subdomains, components, columns)
+@pytest.mark.parametrize(("bodies", "pieces"), [(1600, 0), (1700, 86)])
+def test_cells_of_small_bodies_are_cut_across_materials_up_to_a_larger_size(bodies, pieces):
+    """Up to 400 000 * 550 / 375 and 400 000 * 550 / 353 with 375 and 353 degrees of freedom a body."""
+    assert BY_COST.across_pieces(600_000, bodies, 2) == pieces
+
+
+def memory(case=None, dofs=(100_000,), subdomains=(9,), components=(2,), columns=0, triangles=1000):
+    nodes = [n // 2 for n in dofs]
+    return partition_policy.memory(case or make_case(), nodes, subdomains, components, columns, triangles)
 
 
 def solves(case, problem):
@@ -93,6 +100,7 @@ def test_more_unknowns_problems_and_columns_take_more_memory():
     assert memory(dofs=(200_000,)) > base > memory(dofs=(50_000, 50_000), subdomains=(5, 4))
     assert base < memory(components=(2, 1)) < 2 * base
     assert memory(columns=10_000) - base == pytest.approx(10_000 * partition_policy.COLUMN_BYTES)
+    assert memory(triangles=9000) - base == pytest.approx(8000 * partition_policy.DOF_BYTES)
     assert memory(subdomains=(10,)) - base == pytest.approx(partition_policy.SUBDOMAIN_BYTES)
     springs = replace(make_case(), interfaces=(InterfaceSection(normal_stiffness=10.0, tangential_stiffness=10.0),))
     assert memory(springs) - base == pytest.approx(9 * partition_policy.SPRING_BYTES)
