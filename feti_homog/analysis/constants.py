@@ -189,9 +189,10 @@ def note_outside(
 
     The mesh explains an excess up to OFF times the estimated error of the value or, if larger, OFF `energy` |value|,
     with the relative energy error `energy`.  An excess within the tolerance of the checks may come from the solver and
-    does not count.  The limits bound constants of periodic cells; cells with other boundaries are not checked.
+    does not count.  The limits bound constants of periodic cells; cells with other boundaries are not checked, nor
+    values after a failed solve or check.
     """
-    if context.case.cell.boundary != "periodic":
+    if context.case.cell.boundary != "periodic" or context.checks.faults:
         return
     for name, (lower, upper) in limits.items():
         value, error = float(values[name]), float(errors[name])

@@ -26,8 +26,6 @@ BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REA
 # other methods, the convergence test sees only the forces, and the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
-ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
-
 
 class ProjectedProblem:
     """The context of the shell matrix P F and the shell preconditioner P H; it stores the last residual r."""
@@ -174,7 +172,7 @@ class Krylov:
         Returns:
             Multipliers lam (rows, k), F lam (rows, k), also on inactive rows, iterations, PETSc's converged reason.
         """
-        iterations, jumps = 0, self._jumps
+        iterations, jumps, permitted = 0, self._jumps, self.ksp.getTolerances()[3]
         for restart in range(MAX_RESTARTS + 2):
             self.test.ends_on_stall = self._restarts and restart <= MAX_RESTARTS
             # A load case starts from 0 if `lam` leaves a residual larger than `right`.
@@ -191,12 +189,14 @@ class Krylov:
                 return lam, applied, iterations, int(REASON.CONVERGED_RTOL)
             self._right.setArray(residual.ravel())
             self._solution.zeroEntries()
+            self.ksp.setTolerances(max_it=permitted - iterations)
             with self._errors.raised():
                 self.ksp.solve(self._right, self._solution)
+            self.ksp.setTolerances(max_it=permitted)
             lam = lam + self._solution.getArray(readonly=True).reshape(lam.shape)
             iterations += self.ksp.getIterationNumber()
             reason = int(self.ksp.getConvergedReason())
-            if reason not in BREAKDOWNS:
+            if reason not in BREAKDOWNS or iterations >= permitted:
                 break
         return lam, jumps.operator.apply(lam), iterations, reason
 
@@ -211,7 +211,8 @@ class Krylov:
     @property
     def extreme_values(self) -> tuple[float, float] | None:
         """Return the smallest and largest singular value of P H P F in the last solve; None without an estimate."""
-        has_values = self.ksp.getComputeSingularValues() and self.ksp.getType() in ESTIMATES_SINGULAR_VALUES
+        # Other methods estimate singular values in a norm in which P H P F is not symmetric.
+        has_values = self.ksp.getComputeSingularValues() and self.ksp.getType() == PETSc.KSP.Type.CG
         if not has_values or self.ksp.getConvergedReason() <= 0 or not self.ksp.getIterationNumber():
             return None
         largest, smallest = self.ksp.computeExtremeSingularValues()

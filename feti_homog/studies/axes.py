@@ -136,7 +136,7 @@ def _value_fault(path: toml_files.TomlPath, value: Any, is_sampled: bool) -> str
         return "step, count: exclude each other; give one"
     if step is not None:
         width = high - low
-        if not types.is_number(step) or not 0 < step <= width or scale == "log":
+        if not types.is_number(step) or step <= 0 or rounded(width / step) < 1 or scale == "log":
             return f"expected a step above 0 and at most to - from, linear{types.hint(step)}"
         too_many = f"about {width / step:.6g} values; expected a step that makes at most {types.MOST_ROWS}"
         return too_many if width / step >= types.MOST_ROWS else ""

@@ -7,9 +7,10 @@ import pytest
 from mpi4py import MPI
 from reference import dense_feti
 from support import torn_cells
-from support.cases import make_case, monolithic_stiffness, relative_error, solve
+from support.cases import case_of, make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 
+from feti_homog import ConvergenceError, run
 from feti_homog.feti.thresholds import DEFAULTS
 
 pytestmark = pytest.mark.parallel
@@ -164,6 +165,21 @@ def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
     assert number("coarse dimension", text) == narrow.solver.natural.kernel_dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
+
+
+def test_other_methods_have_no_condition_number(comm, capfd):
+    """GMRES estimates singular values in a norm in which the operator is not symmetric."""
+    cell, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_ksp_type": "gmres"})
+    assert "iterations" in text and "condition number" not in text and not cell.solver.condition
+
+
+def test_restarts_count_towards_the_permitted_iterations(comm):
+    inner = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": 1e-2}
+    petsc = {f"feti_natural_{name}": value for name, value in inner.items()} | {"feti_ksp_max_it": 40}
+    hexagonal = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.1}
+    with pytest.raises(ConvergenceError) as caught:
+        run(case_of(hexagonal, petsc=petsc, decomposition={"cut": "bodies"}), comm)
+    assert caught.value.result.solver.iterations == (40, 40, 40)
 
 
 def test_nothing_is_printed_unasked(comm, capfd):

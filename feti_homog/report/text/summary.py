@@ -161,7 +161,7 @@ def _cell(document: Document) -> list[str]:
     shares = [f"{phase} {share:.6f}" for phase, share in cell.get("fractions", {}).items()]
     shares += [f"voids {cell['porosity']:.6f}"] if cell.get("porosity") else []
     meshed = f"fibre fraction {cell['fibre_fraction']:.6f}" + (f" ({', '.join(shares)})" if shares else "")
-    mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
+    mesh = [_number(cell["elements"], "element"), f"{_number(cell['nodes'], 'node')} of subdomains"]
     mesh += [f"order {shape['order']}"] if "order" in shape else []
     if "refine" in shape:
         mesh.append(f"refine {shape['refine']}")

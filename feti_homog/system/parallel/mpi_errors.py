@@ -120,7 +120,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
     """Convert a MemoryError to a NoMemoryError with one line for the user."""
     detail = f": {error}" if str(error) else ""
-    hint = "`feti-homog check` estimates the memory of a case, which more ranks share"
+    hint = "`feti-homog check` estimates the memory of a case, which more ranks share; `ulimit -v` may limit it"
     return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")
 
 

@@ -84,6 +84,8 @@ PETSC_NAMES = (
 )  # fmt: skip
 # Beginnings of options with which PETSc waits for a person, runs other code, or reads unchecked files.
 NOT_IN_BATCH = re.compile("history|citations|python|options_.*yaml|start_|stop_|debug|dll|on_error_(att|em)")
+# Beginnings of options that would replace what the Krylov method gets from the program.
+OWN_CHOICES = re.compile("feti_ksp_(convergence_test|constant_null_space|diagonal_scale|guess|fischer_guess|initial_)")
 # Beginnings of further options, which differ between releases of PETSc.
 PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
 
@@ -100,7 +102,9 @@ def unknown_options(names: Iterable[str]) -> list[str]:
     faults = []
     for name in names:
         hint = ""
-        if name.startswith("feti_"):
+        if OWN_CHOICES.match(name):
+            hint = "the program itself chooses the start, the scaling and the end of the iteration"
+        elif name.startswith("feti_"):
             if name not in TABLE and not solver_prefix(name):
                 hint = f"unknown option; {suggestion(name)}"
         elif f"feti_{name}" in TABLE:

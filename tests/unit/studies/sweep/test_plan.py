@@ -64,6 +64,7 @@ def test_loads_by_name_are_varied_as_any_keys():
     [
         ("{from = 0.1, to = 0.3, step = 0.1}", [0.1, 0.2, 0.3]),
         ("{from = 0.1, to = 0.35, step = 0.1}", [0.1, 0.2, 0.3]),
+        ("{from = 0.2, to = 0.6, step = 0.4}", [0.2, 0.6]),  # 0.6 - 0.2 is less than 0.4 by rounding
         ("{from = 0.1, to = 0.3, count = 5}", [0.1, 0.15, 0.2, 0.25, 0.3]),
         ("{from = 0.01, to = 0.16, count = 3, scale = 'log'}", [0.01, 0.04, 0.16]),
     ],
