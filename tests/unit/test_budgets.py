@@ -23,7 +23,7 @@ LINES = {
     "case": 2880 + 36 + 131,
     "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 24,
-    "feti": 6300 + 8 + 36,
+    "feti": 6300 + 8 + 37,
     "homogenization": 3230 + 58 + 18,
     "interface": 4000 + 24 - 38,
     "materials": 1430 + 58 + 99,
@@ -33,10 +33,10 @@ LINES = {
     "results": 2430 + 227 + 50,
     "schema": 430 + 7 + 5,
     "studies": 2950 + 129 + 93,
-    "system": 1770 + 26 + 14,
+    "system": 1770 + 26 + 24,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1235
+FILES, TOTAL = 310, 45000 + 800 + 1246
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -4,7 +4,6 @@ import heapq
 from dataclasses import dataclass
 
 import numpy as np
-import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
@@ -132,6 +131,8 @@ def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
 
 def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
     """Return METIS parts (n,) of graph nodes: `count` parts of equal `load` (n,), or connected parts of equal size."""
+    import pymetis  # slow to import, and small cells are not cut
+
     options = pymetis.Options(contig=int(load is None), seed=0)
     adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
     _, part = pymetis.part_graph(count, adjacency, eweights=graph.data, vweights=load, options=options)

@@ -24,8 +24,15 @@ SETTINGS = {
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
     "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
 }
-# Settings of Open MPI for ranks on one host: its libraries of networks would take 0.2 s to measure the clock.
-ONE_HOST = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_ess_singleton_isolated": "1"}
+# The transport of Open MPI for ranks on one host: its libraries of networks would take 0.2 s to measure the clock.
+ONE_HOST = {"OMPI_MCA_pml": "ob1"}
+# A rank without a launcher: Open MPI 4 would start a daemon in 0.2 s; without it, ranks share the session folder, which
+# must not exist then, nor the pointers to files in it.
+ONE_RANK = {
+    "OMPI_MCA_ess_singleton_isolated": "1",
+    "OMPI_MCA_orte_create_session_dirs": "0",
+    "OMPI_MCA_sharedfp": "^sm",
+}
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
 # Bytes of stack for MPI, which does not start with a quarter of this; bytes of addresses for a small run on one rank.
@@ -35,7 +42,8 @@ STACK, ADDRESSES = 1 << 20, 1 << 30
 def prepare_environment(environment: MutableMapping[str, str]) -> None:
     """Set the variables of SETTINGS that `environment` lacks; OMP_THREAD_LIMIT only if OMP_NUM_THREADS is 1.
 
-    Also sets the variables of ONE_HOST if all ranks are on one host, unless the user chooses transports of Open MPI.
+    Also sets the variables of ONE_HOST if all ranks are on one host, unless the user chooses transports of Open MPI,
+    and those of ONE_RANK without a launcher.
     """
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
@@ -45,6 +53,8 @@ def prepare_environment(environment: MutableMapping[str, str]) -> None:
     is_on_one_host = not is_launched or (on_host is not None and on_host == ranks)
     if is_on_one_host and not any(f"OMPI_MCA_{name}" in environment for name in ("pml", "mtl", "btl")):
         environment.update(ONE_HOST)
+    if not is_launched:
+        environment.update(ONE_RANK)
 
 
 def require_limits() -> None:

@@ -16,29 +16,32 @@ LARGE = 100 * 2**20  # bytes
 def test_settings_and_threads_of_the_user_stay():
     variables = {"OMP_THREAD_LIMIT": "2"}
     process.prepare_environment(variables)
-    assert variables == process.SETTINGS | process.ONE_HOST | {"OMP_THREAD_LIMIT": "2"}
+    assert variables == process.SETTINGS | process.ONE_HOST | process.ONE_RANK | {"OMP_THREAD_LIMIT": "2"}
     variables = {"OMP_NUM_THREADS": "4"}
     process.prepare_environment(variables)
     assert variables.pop("OMP_NUM_THREADS") == "4" and "OMP_THREAD_LIMIT" not in variables
-    assert (process.SETTINGS | process.ONE_HOST).items() >= variables.items()
+    assert (process.SETTINGS | process.ONE_HOST | process.ONE_RANK).items() >= variables.items()
+
+
+ALONE = process.ONE_HOST | process.ONE_RANK
 
 
 @pytest.mark.parametrize(
-    ("variables", "expected"),
+    ("variables", "added"),
     [
-        ({"SLURM_PROCID": "0"}, True),  # of a batch script, which is no rank of `srun`
-        ({"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_LOCAL_SIZE": "4"}, True),
-        ({"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_LOCAL_SIZE": "2"}, False),
-        ({"PMIX_RANK": "0"}, False),
-        ({"PMI_RANK": "0"}, False),
-        ({"OMPI_MCA_btl": "tcp,self"}, False),
-        ({"OMPI_MCA_mtl": "psm2"}, False),
+        ({"SLURM_PROCID": "0"}, ALONE),  # of a batch script, which is no rank of `srun`
+        ({"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_LOCAL_SIZE": "4"}, process.ONE_HOST),
+        ({"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_LOCAL_SIZE": "2"}, {}),
+        ({"PMIX_RANK": "0"}, {}),
+        ({"PMI_RANK": "0"}, {}),
+        ({"OMPI_MCA_btl": "tcp,self"}, process.ONE_RANK),
+        ({"OMPI_MCA_mtl": "psm2"}, process.ONE_RANK),
     ],
 )
-def test_networks_are_left_out_where_all_ranks_are_on_one_host(variables, expected):
+def test_open_mpi_starts_without_networks_on_one_host_and_without_a_daemon_alone(variables, added):
     found = dict(variables)
     process.prepare_environment(found)
-    assert found == variables | process.SETTINGS | (process.ONE_HOST if expected else {})
+    assert found == variables | process.SETTINGS | added
 
 
 def test_numpy_is_not_loaded_before_the_settings():
