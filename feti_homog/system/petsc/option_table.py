@@ -85,7 +85,7 @@ PETSC_NAMES = (
 # Beginnings of options with which PETSc waits for a person, runs other code, or reads unchecked files.
 NOT_IN_BATCH = re.compile("history|citations|python|options_.*yaml|start_|stop_|debug|dll|on_error_(att|em)")
 # Beginnings of options that would replace what the Krylov method gets from the program.
-OWN_CHOICES = re.compile("feti_ksp_(convergence_test|constant_null_space|diagonal_scale|guess|fischer_guess|initial_)")
+OWN_CHOICES = re.compile("feti_ksp_(convergence_test|check_norm|constant_null_space|diagonal_scale|guess|fischer|init)")
 # Beginnings of further options, which differ between releases of PETSc.
 PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
 

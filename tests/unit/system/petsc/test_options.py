@@ -139,7 +139,7 @@ def test_words_with_one_dash_are_petscs_and_the_others_ours(line, ours, petsc, t
 def test_every_option_of_the_table_is_known_and_has_help():
     assert unknown_options(option.name for option in OPTIONS) == []
     assert unknown_options(["feti_ksp_gmres_restart", "feti_sub_mat_mumps_icntl_14", "log_view"]) == []
-    own = ["feti_ksp_convergence_test", "feti_ksp_constant_null_space", "feti_ksp_initial_guess_nonzero"]
+    own = ["feti_ksp_convergence_test", "feti_ksp_check_norm_iteration", "feti_ksp_initial_guess_nonzero"]
     hint = "the program itself chooses the start, the scaling and the end of the iteration"
     assert unknown_options(own) == [f"-{name}: {hint}" for name in own]
     assert len({option.name for option in OPTIONS}) == len(OPTIONS)
