@@ -20,7 +20,7 @@ import tomli_w
 from feti_homog import __version__
 from feti_homog.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoints, output_folder, result_json
+from feti_homog.results import atomic, checkpoints, field_file, output_folder, result_json
 from feti_homog.schema import types
 from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import file_locks, input_files
@@ -208,6 +208,10 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
             document = result_json.read(folder)
             if identity_of(document["digest"], document["case"]["petsc"]) != entry.identity:
                 return CaseState(Status.DAMAGED, f"{path} is of another case")
+            fields, seal = folder / field_file.NAME, document.get("result_h5")
+            # Users may remove the fields, which take most of the room.
+            if seal is not None and fields.is_file() and fields.stat().st_size != seal["bytes"]:
+                return CaseState(Status.DAMAGED, f"{fields} has another size than when it was written")
             return CaseState(Status(document["status"]), "; ".join(document["faults"]), document)
     except (FetiHomogError, KeyError, TypeError, ValueError) as error:
         return CaseState(Status.DAMAGED, f"{path} is not a readable result: {error}")

@@ -162,23 +162,27 @@ class CaseRunner:
     def run_free(self, shows: bool) -> FetiHomogError | None:
         """Run cases until none is left, and show the progress if `shows`.  Collective in the group.
 
-        The group skips cases that others hold; in a last round it waits for their locks.  Returns the error that
-        stopped the group or, at the end, the faults of begun paths; else None.  Raises the error if other ranks of the
-        group do not report an error in time.
+        The group computes a case once, also if its result is damaged at once.  It skips cases that others hold; in a
+        last round it waits for their locks.  Returns the error that stopped the group or, at the end, the faults of
+        begun paths; else None.  Raises the error if other ranks of the group do not report an error in time.
         """
         timeouts, count, faults = [0.0, file_locks.LOCK_TIMEOUT_S], len(self.sweep.entries), dict[str, None]()
+        computed = set[int]()
         progress, label = standard_streams.Progress(self.comm, quiet=not shows), f"cases of {self.directory.name}"
         try:
             with stepped_progress.shown(progress, label) as advance:
                 while timeouts:
                     outcomes = list[Outcome]()
                     for number, entry in enumerate(self.sweep.entries, 1):
+                        if number in computed:
+                            continue
                         try:
                             outcomes.append(self.run(entry, timeouts[0], advance)[0])
                         except CaseError as error:  # of a begun path, which stays; the other cases go on
                             faults |= dict.fromkeys(error.faults)
                             outcomes.append(Outcome.FAILED_BEFORE)
                         is_known = outcomes[-1] is not Outcome.COMPUTED
+                        computed |= set() if is_known else {number}
                         advance(number / count, number, f"{number} of {count} cases", is_known)
                     timeouts = timeouts if Outcome.COMPUTED in outcomes else timeouts[1:]
         except FetiHomogError as error:

@@ -42,6 +42,21 @@ def test_corrupt_results_are_computed_again(tmp_path):
     assert "4 done" in collected(out).stdout
 
 
+def test_a_case_whose_fields_are_cut_is_computed_again(tmp_path):
+    """A case whose fields were removed stays: they take most of the room."""
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    path.write_text(path.read_text().replace("fields = false", "fields = true"))
+    swept(out, path)
+    fields = [out / f"case-000{number}/result.h5" for number in (1, 2)]
+    size = fields[0].stat().st_size
+    os.truncate(fields[0], size // 2)
+    fields[1].unlink()
+    assert "1 damaged, 1 done" in collected(out).stdout
+    assert "case-0001: " in swept(out, path).stdout
+    assert "2 done" in collected(out).stdout
+    assert fields[0].stat().st_size == size and not fields[1].exists()
+
+
 def test_a_damaged_list_of_cases_is_reported(tmp_path):
     out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
     swept(out, path)

@@ -87,3 +87,10 @@ def test_failed_cases_end_the_sweep_as_one_error(comm, shared_path):
     assert table.status == ["not converged"] * 2 and "no convergence" in table.reason[0]
     entries = on_root(comm, case_folders.read_index, shared_path / "out").entries
     assert [entry.folder for entry in entries] == table.folder
+
+
+def test_a_case_whose_result_does_not_fit_is_computed_once(comm, shared_path, monkeypatch):
+    """A mesh file may change while the sweep runs."""
+    monkeypatch.setattr(case_folders, "identity_of", lambda *_: "of another mesh")
+    table = swept(comm, shared_path, "'cell.fibre_fraction' = [0.2, 0.3]\n")
+    assert table is None or table.status == ["damaged", "damaged"]
