@@ -192,11 +192,11 @@ class RecoveredStress:
             result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
         return result.reshape(*points.shape[:2], *shape)
 
-    def difference(self, weights: Float) -> tuple[Float, Float]:
+    def difference(self, weights: Float | None = None) -> tuple[Float, Float]:
         """Compute the energy products of the difference ds between recovered and element stresses.
 
-        Returns int ds_i : S : ds_j (k, k), with the flexibility S and element `weights` (e,), and the diagonal (e, k)
-        by element, without weights.
+        Returns int ds_i : S : ds_j (k, k), with the flexibility S and element `weights` (e,), by default 1, and the
+        diagonal (e, k) by element, without weights.
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((k, k)), [np.zeros((0, k))]
@@ -216,7 +216,8 @@ class RecoveredStress:
                 difference += (difference[0] + difference[1] + difference[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
                 difference = (difference * np.sqrt(chunk.weights / 12)).reshape(3, e, m, k)
             difference = (difference.reshape(-1, m * k) @ root).reshape(difference.shape)
-            flat, weighted = difference.reshape(-1, k), difference * weights[chunk.part, None, None]
-            total += flat.T @ weighted.reshape(-1, k)
+            flat = difference.reshape(-1, k)
+            weighted = flat if weights is None else (difference * weights[chunk.part, None, None]).reshape(-1, k)
+            total += flat.T @ weighted
             shares.append(np.einsum("qemk,qemk->ek", difference, difference))
         return total, np.concatenate(shares)

@@ -103,10 +103,12 @@ def energy_errors(
         zones = zones or energy_release.TipZones(cell)
         singular = zones.singular(responses[0])
     for stress, sides in _recovered(cell, responses, lattice):
-        places = stress.points[stress.triangles[:, :3]].mean(axis=1), sides.points[:, [0, -1]].mean(axis=1)
-        weights = [zones.weights(x, *singular) if zones and singular else np.ones(len(x)) for x in places]
-        energy, of_each = stress.difference(weights[0])
-        sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides, weights[1])
+        by_element, by_side = None, np.ones(len(sides.points))
+        if zones and singular:
+            by_element = zones.weights(stress.points[stress.triangles[:, :3]].mean(axis=1), *singular)
+            by_side = zones.weights(sides.points[:, [0, -1]].mean(axis=1), *singular)
+        energy, of_each = stress.difference(by_element)
+        sums += of_elements * energy, of_arcs * arc_error.arc_energy(stress, sides, by_side)
         shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = distributed_arrays.allreduce_sum(cell.comm, sums) / area
     if zones and singular:

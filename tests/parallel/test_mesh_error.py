@@ -138,7 +138,7 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
         x, y = s.positions.T
         u = np.stack([x + 2 * y, x - y] if order == 1 else [x * x + 2 * x * y, x * y - y * y], axis=1)
         body = RecoveredStress.on(s.mesh, s.L, s.problem, u[..., None], np.zeros((3, 1)))
-        energy, shares = body.difference(np.ones(len(body.triangles)))
+        energy, shares = body.difference()
         assert energy[0, 0] == pytest.approx(shares.sum())
         # Curved elements on the arc have no quadratic displacements.
         middles = s.positions[s.mesh.node_class[s.mesh.triangles]].mean(axis=1)
@@ -221,7 +221,7 @@ def test_bodies_of_a_phase_together_have_the_errors_of_each():
     elements, arcs, shares = np.zeros((3, 3)), np.zeros((3, 3)), [np.zeros((0, 3))]
     for part, own in cell.by_part(cell.extended(u, loads)):
         body = RecoveredStress.on(part.mesh, part.L, part.problem, own.reshape(-1, 2, 3), loads, part.is_mixed)
-        total, each = body.difference(np.ones(len(body.triangles)))
+        total, each = body.difference()
         elements += total / cell.summary.area
         shares.append(each / cell.summary.area)
         sides = ArcSides.of(body, [part.submesh], cell.lattice)

@@ -22,9 +22,9 @@ LINES = {
     "analysis": 3000 + 140 + 66,
     "case": 2880 + 36 + 131,
     "commands": 560 + 10 + 30,
-    "fem": 1150 + 3 - 24,
+    "fem": 1150 + 3 - 23,
     "feti": 6300 + 8 + 37,
-    "homogenization": 3230 + 58 + 18,
+    "homogenization": 3230 + 58 + 20,
     "interface": 4000 + 24 - 38,
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 160,
     "results": 2430 + 227 + 50,
     "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 93,
+    "studies": 2950 + 129 + 101,
     "system": 1770 + 26 + 24,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1246
+FILES, TOTAL = 310, 45000 + 800 + 1257
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.
