@@ -167,7 +167,9 @@ def passed_strengths(document: path_curves.Document, peak: path_curves.Document,
                 way, share = "at about", ratios[k - 1 : k + 1]
                 places = [f"{name} = {np.interp(1.0, share, pair):.4g}" for name, pair in ends.items()]
             else:
-                way, places = "between", [f"{name} = {a:.4g} and {b:.4g}" for name, (a, b) in ends.items()]
+                way, pairs = "between", {name: (f"{a:.4g}", f"{b:.4g}") for name, (a, b) in ends.items()}
+                differing = [name for name, (a, b) in pairs.items() if a != b] or names
+                places = [f"{name} = {' and '.join(pairs[name])}" for name in differing]
             passed = f"[material.{phase['phase']}] strength: the utilisation reaches 1 {way} {', '.join(places)}"
             lines.append(f"{passed}{subject} takes the phase as elastic beyond")
     return lines

@@ -252,6 +252,14 @@ def table_of(points: Sequence[Point]) -> dict[str, Float]:
     return dict(zip((*names, *strains, load_sections.TEMPERATURE), np.array(rows, float).T, strict=True))
 
 
+def largest_jump(document: Document, strain: str, least: float) -> tuple[int, int] | None:
+    """Return the points between which `strain` changes most at one load; None up to the fraction `least` of it."""
+    values, load = table_of(document["path"])[strain], [point["load_factor"] for point in document["path"]]
+    runs = np.split(np.arange(len(load)), np.flatnonzero(np.abs(np.diff(load)) > SAME_LOAD) + 1)
+    ends = max(((int(run[0]), int(run[-1])) for run in runs), key=lambda ends: float(abs(np.diff(values[[*ends]]))[0]))
+    return ends if abs(values[ends[1]] - values[ends[0]]) > least * np.abs(values).max() else None
+
+
 def load_controlled(points: Sequence[Point]) -> Float:
     """Return the v corners of a proportional path under a rising load: stresses, strains, temperature, (v, 2 c + 1).
 

@@ -42,7 +42,8 @@ def path_table(document: Document, limit: int | None = None) -> Table:
     noun, label = document["case"]["path"]["method"].removesuffix("s"), stress_label(document)
     columns = [Column(noun, len(noun), "d"), *(Column(name, max(11, len(name) + 1)) for name in names)]
     columns += [Column("load", 9, ".6f"), *COUNTS]
-    totals = [*_peak_lines(document, landmarks.peak_of(document)), *_path_energies(document, label)]
+    peak = landmarks.peak_of(document)
+    totals = [*_peak_lines(document, peak), *jump_lines(document, peak), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} {noun}s{some}; {broke} bonds broke", columns, rows, totals)
 
@@ -101,6 +102,22 @@ def _peak_lines(document: Document, peak: Document) -> list[str]:
     if path_curves.scales_with_toughness(document) and path_curves.legs(document) == 1:
         lines.append("Scaling: strains and stresses of the path grow with the root of the toughness")
     return lines
+
+
+def jump_lines(document: Document, peak: Document) -> list[str]:
+    """Describe the largest jump of the leading strain if its given stress is largest at the end; else [].
+
+    Under a given strain the stress would fall there.
+    """
+    name, stress = peak["strain_name"], peak["stress_name"]
+    jump = path_curves.largest_jump(document, name, landmarks.LEAST_DROP)
+    if "event" not in peak or landmarks.name_of(document, peak) != landmarks.LARGEST or jump is None:
+        return []
+    if stress not in path_curves.targets(document)[int(path_curves.legs_of(document)[peak["event"]]) - 1]:
+        return []
+    table, (first, last) = path_curves.table_of(document["path"]), jump
+    way, at = f"from {table[name][first]:.6g} to {table[name][last]:.6g}", f"{stress} = {table[stress][first]:.6g}"
+    return [f"{name} jumps {way} at {at}: prescribe {name} for the peak"]
 
 
 def _landmark(document: Document, peak: Document, title: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.constant_tables import cell_constants, moduli, stiffnesses
-from feti_homog.report.text.path_table import _path_energies, _peak_lines
+from feti_homog.report.text.path_table import _path_energies, _peak_lines, jump_lines
 from feti_homog.report.text.point_tables import components, envelope_table
 from feti_homog.report.text.summary import STRESSES, phase_tables
 from feti_homog.report.text.tables import Column, Table
@@ -226,6 +226,18 @@ def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, 
     assert words.startswith(begins) and words.endswith(ends)
     assert marks(document)[peak["event"]].removeprefix("first break and ") == mark
     assert words.count("; first break in the step to") == broke  # the stress behind the breaks of an increment
+
+
+def test_a_strain_that_jumps_under_a_given_stress_is_reported() -> None:
+    """Two of four points have one load; under a given strain the stress would fall there."""
+    document = along([10.0, 20.0, 20.0, 30.0], 1)
+    document["case"]["path"] = {"method": "events", "to": {"S11": 30.0}}
+    for point, load, strain in zip(document["path"], (0.3, 0.6, 0.6, 1.0), (1e-3, 2e-3, 7e-3, 9e-3), strict=True):
+        point |= {"load_factor": load, "strain": [strain, 0.0, 0.0]}
+    lines = jump_lines(document, peak_of(document))
+    assert lines == ["E11 jumps from 0.002 to 0.007 at S11 = 20: prescribe E11 for the peak"]
+    document["path"][2]["strain"][0] = 2.05e-3
+    assert jump_lines(document, peak_of(document)) == []
 
 
 @pytest.mark.parametrize("status", [{"unfinished": "by a limit"}, {}])
