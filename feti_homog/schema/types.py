@@ -63,10 +63,15 @@ def hint(value: Any) -> str:
     """Return a hint on a value, or an entry of a list, with scatter or beyond the limits; otherwise an empty string."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(hint, value)), "")
-    if isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"}):
+    if has_scatter(value):
         return "; `feti-homog uncertainty` takes scatter"
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
     return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""  # NaN differs from itself
+
+
+def has_scatter(value: Any) -> bool:
+    """Return whether a value is a number with scatter, as `feti-homog uncertainty` takes it."""
+    return isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
 
 
 def is_number(value: Any) -> bool:
@@ -129,7 +134,8 @@ def either(expected: str, *types: ValueType) -> ValueType:
 
 def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
     """Return the type of tables with `least` keys or more; `TableReader` reads them into the class `table`."""
-    return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, table)
+    accepts = lambda value: isinstance(value, dict) and len(value) >= least and not has_scatter(value)  # noqa: E731
+    return ValueType(expected, accepts, lambda value: value, table)
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:

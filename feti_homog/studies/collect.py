@@ -64,7 +64,8 @@ def means(table: SweepTable) -> list[str]:
     names = [name for name in known if name in table.stated]
     shown = constant_tables.shown(known) if "E1" in known else names
     names = [name for name in names if name in shown and not re.match(r"C\d|onset_[^S]", name)] or names
-    columns = [tables.Column("output", -22), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
+    width = max([22, *(len(tables.with_unit(name, table.stress_unit)) + 2 for name in names)])
+    columns = [tables.Column("output", -width), tables.Column("cases", 6, "d"), tables.Column("mean", 13, ".6g")]
     columns += [tables.Column("std"), tables.Column("95 % +-")]
     lines, values = list[str](), list[list[Any]]()
     for number, point in enumerate(table.points):

@@ -10,6 +10,7 @@ import numpy as np
 from feti_homog.case import Case, bond_laws, interface_section, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
+from feti_homog.report.cards import effective_material
 from feti_homog.report.text import point_tables
 from feti_homog.results import landmarks, path_curves
 from feti_homog.schema import wording
@@ -108,10 +109,13 @@ def responses(document: path_curves.Document) -> dict[str, float]:
     They are constants of a stiffness, entries of a conductivity, onset and peak of a path, columns of other analyses.
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
+    if kind == "conductivity":
+        k = np.array(document["effective_conductivity"])
+        is_large = np.abs(k) > effective_material.NEGLIGIBLE * np.sqrt(np.outer(np.diag(k), np.diag(k)))
+        names = [name for name, kept in zip(CONDUCTIVITIES, is_large.ravel(), strict=True) if kept]
+        return {name: values[name] for name in names}
     if kind == "stiffness" or "sensitivities" in document:
         return values
-    if kind == "conductivity":
-        return {name: values[name] for name in CONDUCTIVITIES}
     starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)
     return {name: values[name] for name in values if name.startswith(starts) and not name.endswith(point_tables.STATES)}
 

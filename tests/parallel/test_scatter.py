@@ -153,3 +153,17 @@ def test_scatter_of_paths_of_which_some_break_no_bond_is_refused(comm, shared_pa
     case["path"]["to"]["S11"] = 1.02 * found
     with pytest.raises(CaseError, match=r"^\[path\]: bonds break, or the stress falls, in some runs"):
         uncertainty.parse(case, Path()).run(shared_path / "some", comm, comm.size, False, True)
+
+
+@pytest.mark.one_rank
+def test_conductivities_have_no_rows_of_couplings_that_the_mesh_makes(comm, shared_path):
+    """The square cell has none, but for its mesh; derivatives of its least conductivity sum to it (Euler)."""
+    conducts = {
+        "matrix": {"conductivity": {"mean": 0.2, "cv": 0.05}},
+        "fibre": {"conductivity": {"mean": 2.0, "cv": 0.1}},
+    }
+    case = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2}, "material": conducts}
+    study = uncertainty.parse(case | {"analysis": {"type": "conductivity"}}, Path())
+    found = study.run(shared_path / "out", comm, None, False, True)["results"]
+    assert [row["name"] for row in found] == ["k11", "k22", "k33"]
+    assert np.array([0.2, 2.0]) @ found[0]["derivatives"] == pytest.approx(found[0]["value"], rel=1e-6)

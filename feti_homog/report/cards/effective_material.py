@@ -222,6 +222,8 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
     if the result is damaged.
     """
     require_done(document)
+    if form not in (known := ("abaqus", "calculix", "ansys")):
+        raise CaseError(f"--format {form} has no card of a conductivity; expected one of {', '.join(known)}")
     turn = np.ix_(FIBRE_FIRST, FIBRE_FIRST)
     k = numbers(document["effective_conductivity"], (3, 3))[turn]
     values, name = np.diag(k).copy(), document["case"]["name"]
@@ -243,8 +245,6 @@ def conductor_card(document: Document, form: str, symmetry: str) -> str:
     if form in ("abaqus", "calculix"):
         keywords = [f"*MATERIAL, NAME={identifier(name)}", "*CONDUCTIVITY, TYPE=ORTHO"]
         return "\n".join([*comment_lines(paragraphs, "**"), *keywords, ", ".join(words)])
-    if form == "ansys":
-        paragraphs.append("Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
-        commands = [f"MP,K{axis * 2},1,{word}" for axis, word in zip("XYZ", words, strict=True)]
-        return "\n".join([*comment_lines(paragraphs, "!"), *commands])
-    raise CaseError(f"--format {form} has no card of a conductivity; expected one of abaqus, calculix, ansys")
+    paragraphs.append("Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7.")
+    commands = [f"MP,K{axis * 2},1,{word}" for axis, word in zip("XYZ", words, strict=True)]
+    return "\n".join([*comment_lines(paragraphs, "!"), *commands])

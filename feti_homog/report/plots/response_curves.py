@@ -145,7 +145,8 @@ def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLA
     names_width = 0.4 + 0.085 * max(map(len, names))
     picture = look.figure(names_width + width * values.shape[1] + 1.2, 1.4 + height * len(names))
     axes = picture.subplots()
-    highest = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    highest = min(max(largest, FAINTEST), 1.0)  # constants near zero have large elasticities
     image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
     narrow = picture.get_figwidth() < plot_helpers.NARROW
     for (row, column), value in np.ndenumerate(values) if not narrow else ():
@@ -157,7 +158,8 @@ def sensitivities(document: Document, look: plot_helpers.Look = plot_helpers.PLA
     axes.set_yticks(range(len(names)), names)
     axes.tick_params(length=0, labeltop=True, labelbottom=False)
     axes.spines[:].set_visible(False)
-    picture.colorbar(image, ax=axes, label="" if narrow else "relative change / relative change")
+    label, extend = "" if narrow else "relative change / relative change", "both" if largest > highest else "neither"
+    picture.colorbar(image, ax=axes, label=label, extend=extend)
     title = "change of a constant (%) by a change of a parameter by 1 %"
     picture.suptitle(plot_helpers.title_of(document["case"], title))
     return picture

@@ -148,7 +148,7 @@ def test_couplings_have_no_card(form):
 
 def test_other_programs_have_none():
     with pytest.raises(CaseError, match=r"--format moose has no card of a conductivity; expected one of abaqus"):
-        export.card_of(conducting(K), "moose")
+        export.card_of(conducting(COUPLED), "moose")
 
 
 @every_format
