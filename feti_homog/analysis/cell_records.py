@@ -218,7 +218,7 @@ class PhaseStresses:
     hydrostatic: Float = described("largest hydrostatic stress, a third of the trace", records.STRESS, "(s,)")
     hydrostatic_at: Float = described("its position in the cell", records.LENGTH, "(s, 2)")
     criterion: str | None = described("criterion of the phase's `strength`", default=None)
-    mode: tuple[str, ...] | None = described("governing mode in Hashin's criterion: `fibre tension`, ...", default=None)
+    mode: tuple[str, ...] | None = described("governing mode in Hashin's criterion: `axial tension`, ...", default=None)
     utilisation: Float | None = described(
         "largest utilisation of the strength: 1 at failure, proportional to the stress", "", "(s,)", default=None
     )

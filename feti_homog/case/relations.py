@@ -190,6 +190,8 @@ def unlike_strengths(
     materials: Mapping[str, material_forms.Material], interfaces: Sequence[InterfaceSection], plane: str
 ) -> list[str]:
     """List strengths above the stiffness of their phase or, on interfaces, of the softest phase, one per line."""
+    if plane == voigt.CONDUCTION.name:  # the laws are conductivities
+        return []
     stiffness = {name: float(laws.stiffness_of(material, plane).max()) for name, material in materials.items()}
     bonds = sorted(interfaces, key=lambda bond: bond.normal_strength or math.inf)[:1]  # others may hold
     tables = [

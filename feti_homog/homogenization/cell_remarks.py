@@ -138,7 +138,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
     if case.analysis.type == "envelope" and cell.order == 1:
         lines += ["[cell] order = 1: onsets err more than the stiffness: expected order = 2 or smaller elements"]
     if cell.geometry == "random" and case.output.mesh_error and case.analysis.type not in ("load", "path", "angle"):
-        lines += ['[cell] geometry = "random": mesh errors of this one cell; for scatter: realisations in [sweep]']
+        lines += ['[cell] geometry = "random": errors are those of its mesh; realisations in [sweep] show the scatter']
     if phase_laws.has_softening(case) and case.interfaces[0].teeth is None:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
@@ -146,7 +146,7 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
         tolerance = f"softening_tolerance = {case.interfaces[0].softening_tolerance:g}"
         events = f", up to {(len(levels) - 1) * bonds} events" if bonds else ""
         if len(levels):
-            lines += [f"[interface] {tolerance}: {len(levels) - 1} teeth a bond{events}"]
+            lines += [f"[interface] {tolerance}: {len(levels) - 1} teeth a bond{events}; a larger one gives fewer"]
     if cell.match is not None and cell.matched is not None and cell.fibre_fraction is not None:
         fraction = cell.matched.fibre_fraction
         remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"

@@ -185,7 +185,7 @@ CRITERIA = {
     ),
 }  # fmt: skip
 """Criteria with the keys that each criterion needs."""
-MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")  # of Hashin's criterion
+MODES = ("axial tension", "axial compression", "transverse tension", "transverse compression")  # of Hashin's criterion
 
 
 def criterion(strength: PhaseStrength) -> str:

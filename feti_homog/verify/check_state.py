@@ -17,7 +17,7 @@ from feti_homog.verify.torus import from_centre
 LAW = "phases"
 # Names of criteria by a key that no other criterion has.
 CRITERIA = dict(principal="maximum principal", von_mises="von Mises", tension="Drucker-Prager", axial_shear="Hashin")
-MODES = ("fibre tension", "fibre compression", "matrix tension", "matrix compression")
+MODES = ("axial tension", "axial compression", "transverse tension", "transverse compression")
 # Relative differences that count as rounding: between the largest value and the value at the stated position; between
 # the position and a quadrature point.
 SAME_VALUE, SAME_PLACE = 1e-5, 1e-9

@@ -68,8 +68,8 @@ CASES: dict[str, tuple[str, str]] = {
     "no such norm": (petsc('feti_ksp_norm_type = "foo"'), "-feti_ksp_norm_type foo: expected preconditioned, "),
     "side that the method lacks": (petsc('feti_ksp_pc_side = "right"'), "-feti_ksp_pc_side right: "),
     "neither true nor false": (
-        petsc('feti_ksp_initial_guess_nonzero = "maybe"'),
-        "-feti_ksp_initial_guess_nonzero maybe: ",
+        petsc('feti_ksp_lag_norm = "maybe"'),
+        "-feti_ksp_lag_norm maybe: ",
     ),
     "no such factorization": (petsc('feti_sub_pc_type = "lux"'), "-feti_sub_pc_type lux: expected one of cholesky, lu"),
     "factors that leave nothing": (

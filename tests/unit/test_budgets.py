@@ -20,7 +20,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES = {
     ".": 470 + 18 + 9,
     "analysis": 3000 + 140 + 66,
-    "case": 2880 + 36 + 131,
+    "case": 2880 + 36 + 133,
     "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 23,
     "feti": 6300 + 8 + 37,
@@ -29,14 +29,14 @@ LINES = {
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
     "microstructure": 2140 + 24 + 62,
-    "report": 3420 + 217 + 160,
-    "results": 2430 + 227 + 50,
-    "schema": 430 + 7 + 5,
-    "studies": 2950 + 129 + 101,
+    "report": 3420 + 217 + 179,
+    "results": 2430 + 227 + 60,
+    "schema": 430 + 7 + 11,
+    "studies": 2950 + 129 + 106,
     "system": 1770 + 26 + 24,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1257
+FILES, TOTAL = 310, 45000 + 800 + 1299
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -24,6 +24,10 @@ def test_strengths_above_a_stiffness_are_warned_of():
     end = "above 3.2, the stiffness of a phase: are both in one unit?"
     expected = (f"[interface] normal_strength = 60: {end}", f"[material.matrix.strength] principal = 3.3: {end}")
     assert parse(asked, Path()).warnings() == expected
+    for phase in asked["material"].values():
+        phase["conductivity"] = 1.0
+    conduction = {name: asked[name] for name in ("cell", "material")} | {"analysis": {"type": "conductivity"}}
+    assert parse(conduction, Path()).warnings() == ()
 
 
 @pytest.mark.parametrize(

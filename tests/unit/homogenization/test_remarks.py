@@ -80,7 +80,7 @@ def test_one_arrangement_has_no_scatter_in_its_errors():
     content = tomllib.loads(VALID_CASES["base"])
     random = content | {"cell": {"geometry": "random", "fibres": 5, "fibre_fraction": 0.4, "seed": 7}}
     (line,) = case_remarks(Case.parse(random))
-    assert line.startswith('[cell] geometry = "random": mesh errors of this one cell')
+    assert line.startswith('[cell] geometry = "random": errors are those of its mesh')
     other = Case.parse(random | {"cell": random["cell"] | {"seed": 8}})
     assert case_remarks(other) == (line,)  # the cases of a sweep have one remark
     assert not case_remarks(Case.parse(random | {"output": {"mesh_error": False}})) + case_remarks(Case.parse(content))

@@ -103,7 +103,7 @@ FALSE = {
         "load", document("phase_stresses", 1, "utilisation_at", 0, 0, factor=1.01), {"phases"},
     ),
     "a criterion": ("load", document("phase_stresses", 1, "criterion", to="von Mises"), {"phases"}),
-    "a mode": ("load", document("phase_stresses", 1, "mode", 0, to="fibre compression"), {"phases"}),
+    "a mode": ("load", document("phase_stresses", 1, "mode", 0, to="axial compression"), {"phases"}),
     "no mode": ("load", document("phase_stresses", 1, "mode", to=[]), {"phases"}),
     "a strength": (
         "load", document("case", "material", "fibre", "strength", "axial_shear", factor=1.01), {"phases"},
