@@ -143,10 +143,12 @@ def case_remarks(case: Case, bonds: int = 0) -> tuple[str, ...]:
         from feti_homog.interface.laws import law_of_sections  # few laws have teeth
 
         levels = getattr(law_of_sections(case.interfaces, np.zeros(0, np.int64)), "levels", ())
-        tolerance = f"softening_tolerance = {case.interfaces[0].softening_tolerance:g}"
+        tolerance = case.interfaces[0].softening_tolerance
         events = f", up to {(len(levels) - 1) * bonds} events" if bonds else ""
+        if tolerance <= interface_section.InterfaceSection.softening_tolerance:
+            events += "; a larger one gives fewer"
         if len(levels):
-            lines += [f"[interface] {tolerance}: {len(levels) - 1} teeth a bond{events}; a larger one gives fewer"]
+            lines += [f"[interface] softening_tolerance = {tolerance:g}: {len(levels) - 1} teeth a bond{events}"]
     if cell.match is not None and cell.matched is not None and cell.fibre_fraction is not None:
         fraction = cell.matched.fibre_fraction
         remark = f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}"

@@ -10,7 +10,6 @@ import numpy as np
 from feti_homog.case import Case, bond_laws, interface_section, load_sections, sections
 from feti_homog.errors import CaseError
 from feti_homog.materials import engineering_constants, laws, voigt
-from feti_homog.report.cards import effective_material
 from feti_homog.report.text import point_tables
 from feti_homog.results import landmarks, path_curves
 from feti_homog.schema import wording
@@ -110,10 +109,9 @@ def responses(document: path_curves.Document) -> dict[str, float]:
     """
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "conductivity":
-        k = np.array(document["effective_conductivity"])
-        is_large = np.abs(k) > effective_material.NEGLIGIBLE * np.sqrt(np.outer(np.diag(k), np.diag(k)))
-        names = [name for name, kept in zip(CONDUCTIVITIES, is_large.ravel(), strict=True) if kept]
-        return {name: values[name] for name in names}
+        k, errors = np.abs(document["effective_conductivity"]), document.get("mesh_error")
+        least = np.max(errors["effective_conductivity"]) if errors else 0.0  # couplings below it are of the mesh
+        return {name: values[name] for name, size in zip(CONDUCTIVITIES, k.ravel(), strict=True) if size > least}
     if kind == "stiffness" or "sensitivities" in document:
         return values
     starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)

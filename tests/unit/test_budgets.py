@@ -24,19 +24,19 @@ LINES = {
     "commands": 560 + 10 + 30,
     "fem": 1150 + 3 - 23,
     "feti": 6300 + 8 + 37,
-    "homogenization": 3230 + 58 + 20,
+    "homogenization": 3230 + 58 + 22,
     "interface": 4000 + 24 - 38,
     "materials": 1430 + 58 + 99,
     "mesh": 5500 + 46 + 294,
     "microstructure": 2140 + 24 + 62,
-    "report": 3420 + 217 + 179,
+    "report": 3420 + 217 + 178,
     "results": 2430 + 227 + 60,
     "schema": 430 + 7 + 11,
-    "studies": 2950 + 129 + 106,
+    "studies": 2950 + 129 + 104,
     "system": 1770 + 26 + 24,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1299
+FILES, TOTAL = 310, 45000 + 800 + 1298
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -43,9 +43,8 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     heights = (2.2, 1, 1) if warms else (2.2, 1)
     picture = look.figure(7.2, 8.8 if warms else 7.2)
     narrow = picture.get_figwidth() < plot_helpers.NARROW
-    panels = picture.subplots(
-        len(heights), len(names), sharex="col", sharey="row", squeeze=False, height_ratios=heights
-    )
+    grid: dict[str, Any] = {"sharex": "col", "sharey": "row", "squeeze": False, "height_ratios": heights}
+    panels: Any = picture.subplots(len(heights), len(names), **grid)
     table = path_curves.table_of(points)
     way = path_curves.table_of(points[: path_curves.first_leg(document)] + path_curves.later_corners(document))
     for name, (upper, *middle, lower) in zip(names, panels.T, strict=True):
@@ -66,14 +65,15 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     for axes in middle:
         axes.set_ylabel("change of temperature\n" r"$\Delta T$")
     lower.set_ylabel("interface\nnodes")
-    panels[-1, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
-    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}")
-    title = "\n".join(filter(None, (heading, document.get("unfinished"), *plot_helpers.bond_limits(case))))
-    (upper.set_title if len(names) == 1 else picture.suptitle)(title)
+    if len(names) == 1:  # several columns have no room
+        lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
+    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), document.get("unfinished")
+    write = upper.set_title if len(names) == 1 else picture.suptitle
+    write("\n".join(filter(None, (*heading, *plot_helpers.bond_limits(case)))))
     plot_helpers.finish_curves(*panels.flat)
     # The panels of path_states.png show the same points.
-    by_state = landmarks.kept_points(document)
-    numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
+    of_state = landmarks.kept_points(document)
+    numbers = [of_state[state] for state in landmarks.landmark_states(document, 6, len(of_state))]
     height = table[landmarks.peak_of(document)["stress_name" if has_stress else "strain_name"]]
     for name, axes in zip(names, panels[0], strict=True):
         _number_points(axes, np.stack([table[name], height], axis=1), numbers)

@@ -114,10 +114,11 @@ def missing_letters_as_boxes() -> Iterator[None]:
 
 
 def finish_curves(*panels: Axes) -> None:
-    """Add faint grids to the panels of a figure, and the first panel's legend below them."""
+    """Add faint grids to the panels of a figure, and below them a legend of all panels that have none of their own."""
     for axes in panels:
         faint_grid(axes)
-    legend_below(panels[0].figure, panels[0].get_legend_handles_labels()[0])
+    labelled = {h.get_label(): h for a in panels if a.get_legend() is None for h in a.get_legend_handles_labels()[0]}
+    legend_below(panels[0].figure, [*labelled.values()])
 
 
 def legend_below(figure: Any, handles: Sequence[Any], limit: int = 5) -> None:
@@ -210,10 +211,8 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
 
 
 def _outside(values: Array, bottom: float, top: float) -> str:
-    goes_below, goes_above = values.min() < bottom, values.max() > top
-    if goes_below:
-        return "both" if goes_above else "min"
-    return "max" if goes_above else "neither"
+    beyond = bool(values.min() < bottom), bool(values.max() > top)
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:

@@ -201,7 +201,9 @@ def test_each_strain_that_leads_a_leg_has_its_panels(shears, names):
     document = bar([{"E11": 5.0}, {"E11": 4.0, "gamma12": 3.0}], [(0.5, 1.0, 5.0, False), (1.0, 1.0, 4.0, False)])
     if shears:
         document["path"][1]["strain"][5], document["path"][1]["stress"][5] = 3.0, 2.0
-    axes = path_picture.figure(document).axes
+    picture = path_picture.figure(document)
+    axes, below = picture.axes, [text.get_text() for text in picture.legends[0].get_texts()]
+    assert ("bonded" in below) == shears == (axes[-1].get_legend() is None) and len(below) == len({*below})
     labels = {"E11": "macroscopic strain $E_{11}$", "gamma12": r"macroscopic strain $\gamma_{12}$"}
     assert [panel.get_xlabel() for panel in axes if panel.get_xlabel()] == [labels[name] for name in names]
     assert len(axes) == 2 * len(names)
