@@ -95,8 +95,8 @@ def figure_over_fractions(table: SweepTable) -> Figure:
     for axes in panels[len(names) :]:
         axes.set_axis_off()
     picture.align_ylabels()
-    planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
-    picture.suptitle(f"{plot_helpers.plain(table.name)}: plane {' and '.join(planes)}")
+    planes = sorted({voigt.plane_state_of(document).title for document in table.finished})
+    picture.suptitle(f"{plot_helpers.plain(table.name)}: {' and '.join(planes)}")
     handles = [handle for axes in panels[::-1] for handle in axes.get_legend_handles_labels()[0]]
     plot_helpers.legend_below(picture, [*{handle.get_label(): handle for handle in handles}.values()])
     return picture
@@ -132,7 +132,8 @@ def _plot_series(axes: Axes, table: SweepTable, series: Series, name: str, numbe
         label, style = f"{BOUNDS.get(name, 'Hill and Hashin')} bounds", ":" if name in PANELS[:2] else "--"
         axes.plot(series.x, ends, style, color=colour, linewidth=0.9, label=label)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
-    axes.plot(series.x, mean, color=colour, marker=marker, markersize=3.5, linewidth=1.2, label=series.label or None)
+    words = series.label or ("mean" if spread.any() else None)
+    axes.plot(series.x, mean, color=colour, marker=marker, markersize=3.5, linewidth=1.2, label=words)
     if spread.any():
         label = "95 % confidence of the mean"
         axes.errorbar(series.x, mean, spread, fmt="none", ecolor=colour, elinewidth=1.2, capsize=2.5, label=label)

@@ -32,11 +32,11 @@ LINES = {
     "report": 3420 + 217 + 178,
     "results": 2430 + 227 + 60,
     "schema": 430 + 7 + 11,
-    "studies": 2950 + 129 + 104,
+    "studies": 2950 + 129 + 105,
     "system": 1770 + 26 + 24,
     "verify": 3100 + 162 + 77,
 }
-FILES, TOTAL = 310, 45000 + 800 + 1298
+FILES, TOTAL = 310, 45000 + 800 + 1299
 # Percent of all lines: private functions that are called once, and imports.
 CALLED_ONCE, IMPORTS = 6.5, 6.0
 # Numbers at the level of modules; pairs of module and name that other packages import.

@@ -67,7 +67,7 @@ def figure(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> 
     lower.set_ylabel("interface\nnodes")
     if len(names) == 1:  # several columns have no room
         lower.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2 if narrow else 4)
-    heading = plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), document.get("unfinished")
+    heading = plot_helpers.title_of(case, voigt.plane_state_of(document).title), document.get("unfinished")
     write = upper.set_title if len(names) == 1 else picture.suptitle
     write("\n".join(filter(None, (*heading, *plot_helpers.bond_limits(case)))))
     plot_helpers.finish_curves(*panels.flat)

@@ -56,7 +56,7 @@ def angle(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -> F
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if all(bond["contact"] for bond in interface_section.interface_tables(case)) else "no contact"
     load = "" if stiff else f", $E=[{','.join(f'{e:g}' for e in points[0]['strain'])}]$"
-    axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
+    axes.set_title(plot_helpers.title_of(case, f"{voigt.plane_state_of(document).title}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     plot_helpers.finish_curves(axes)
     if stiff:
@@ -98,7 +98,7 @@ def envelope(document: Document, look: plot_helpers.Look = plot_helpers.PLAIN) -
     axes.set(xlabel=f"${plot_helpers.SYMBOLS[plane[0]]}${unit}", ylabel=f"${plot_helpers.SYMBOLS[plane[1]]}${unit}")
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
-    title = plot_helpers.title_of(case, f"onset of debonding or softening, plane {case['analysis']['plane']}")
+    title = plot_helpers.title_of(case, f"onset of debonding or softening, {voigt.plane_state_of(document).title}")
     axes.set_title("\n".join(filter(None, [title, *plot_helpers.bond_limits(case), ", ".join(notes)])))
     plot_helpers.faint_grid(axes)
     return picture

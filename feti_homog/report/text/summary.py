@@ -141,7 +141,7 @@ def answers(document: Document, most: int | None = None) -> list[Table]:
 def title_of(document: Document) -> str:
     """Return a title with case name, analysis and plane state."""
     case = document["case"]
-    plane = "" if reported(document) == CONDUCTIVITY else f", plane {case['analysis']['plane']}"
+    plane = "" if reported(document) == CONDUCTIVITY else f", {voigt.plane_state_of(document).title}"
     return f"{case.get('name', '')}: {reported(document).title}{plane}".lstrip(": ")
 
 

@@ -216,7 +216,9 @@ def test_the_state_under_a_load_is_reported() -> None:
     document["case"]["analysis"] = {"type": "load", "plane": "generalized"}
     document["case"]["load"] = {"to": {"S22": 60.0, "S13": 25.0, "gamma12": 0.0, "temperature": -100.0}}
     text = summary(document)
-    assert max(map(len, text.splitlines())) <= 100 and text.startswith("pair: equilibrium under a load, plane gen")
+    assert max(map(len, text.splitlines())) <= 100 and text.startswith(
+        "pair: equilibrium under a load, generalized plane"
+    )
     assert "Equilibrium under S22 = 60, S13 = 25, gamma12 = 0, temperature = -100" in text
     assert line(text, "stress").split() == ["stress", "(GPa)", "0", "60", "0", "0", "25", "0"]
     assert line(text, "Stored") == "Stored per area (GPa): 3" and line(text, "Debonded").endswith(

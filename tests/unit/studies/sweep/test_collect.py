@@ -266,7 +266,7 @@ def test_secants_in_space_are_drawn_without_bounds(tmp_path):
     table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
     assert pictures.panels_of(table) == ("C11", "C33", "C44", "C66")
     figure = pictures.figure_over_fractions(table)
-    assert figure.get_suptitle().endswith("plane generalized")
+    assert figure.get_suptitle().endswith(": generalized plane strain")
     assert not any("gamma" in axes.get_ylabel() for axes in figure.axes)
     assert_drawn(tmp_path, table, ["moduli.png"])
 
